@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.design.quantities import COVERS
 from pteron.design.regions import placed_pose, workspace_poses, workspace_region
@@ -93,7 +94,10 @@ class Design(Result):
         """Return the largest cube of feasible poses that excludes the infeasible poses (F, m)."""
         task, ball = self.task, search_ball(self.robot)
         shape, _ = task.shape
-        return largest_fit(task.conditions, self.geometry, task.orientations, ball, failing, shape)
+        angles, poses = self.robot.platform.angular, task.orientations
+        sampled = (failing[:, None, angles] == poses[:, angles]).all(axis=-1).any(axis=-1)
+        poses = np.vstack([poses, failing[~sampled]])
+        return largest_fit(task.conditions, self.geometry, poses, ball, failing, shape)
 
     @cached_property
     def workspace(self) -> WorkspaceTable | None:
@@ -145,9 +149,9 @@ class Design(Result):
         return worst_speeds(self.robot, poses, self.task.spec.motion.speed)
 
     def region(self, pose: Array) -> Region:
-        """Return the region of the workspace, or of the cube, at the orientation of a pose (m,)."""
+        """Return the workspace, or the cube, as a region at a pose's orientation, or at all."""
         if self.workspace is not None:
-            return workspace_region(self.workspace, pose)
+            return self.task.oriented_region(workspace_region(self.workspace, pose))
         half = 0.5 * self.cube.edge
         return Box(*(placed_pose(pose, self.cube.center + side * half) for side in (-1.0, 1.0)))
 
@@ -163,13 +167,11 @@ class Design(Result):
         signed = sign * of(self, poses)
         if np.isnan(signed).any():
             return np.nan
-        lengths = len(self.robot.platform.lengths)
-        offsets = np.zeros((3**lengths, self.robot.freedom))
-        offsets[:, :lengths] = list(product((-1.0, 0.0, 1.0), repeat=lengths))
         starts = np.argsort(signed, kind="stable")[-_STARTS:]
         worst, most = poses[starts], signed[starts]
         regions = [self.region(pose) for pose in worst]
         low, high = np.stack([region.box for region in regions], axis=1)
+        offsets = _neighbours((high > low).any(axis=0), self.robot.platform.angular)
         step = (high - low) / self._samples
         for _ in range(_ROUNDS):
             step = step / 2.0
@@ -188,7 +190,7 @@ class Design(Result):
     @cached_property
     def cycles(self) -> tuple[Motion, ...]:
         """The motions of the task's cycles, placed about the middle of the workspace."""
-        spec, middle = self.task.spec, self.task.orientations[0].copy()
+        spec, middle = self.task.spec, self.task.stated_poses[0].copy()
         lengths = len(self.robot.platform.lengths)
         ends = None if self.workspace is None else np.array(self.workspace.ends)
         if ends is not None:
@@ -205,7 +207,7 @@ class Design(Result):
 
         A cycle that may be done anywhere is evaluated at all its places and turns in the workspace.
         """
-        cycles, pose = self.task.spec.cycles, self.task.orientations[0]
+        cycles, pose = self.task.spec.cycles, self.task.stated_poses[0]
         anywhere = self.workspace is not None and any(cycle.anywhere for cycle in cycles)
         return size(
             self.loaded_robot,
@@ -335,6 +337,16 @@ class Design(Result):
         widths = np.ptp(joint_limits(self.task.robot), axis=0)
         endless = np.isinf(widths)
         return np.where(endless, _start(self.task).strokes, widths) if endless.any() else widths
+
+
+def _neighbours(varies: NDArray[np.bool_], angular: NDArray[np.bool_]) -> Array:
+    """Return steps (S, m), each -1, 0 or 1, to neighbours in places or in angles, not in both."""
+    steps = np.zeros((0, len(varies)))
+    for free in (varies & ~angular, varies & angular):
+        part = np.zeros((3 ** int(free.sum()), len(varies)))
+        part[:, free] = list(product((-1.0, 0.0, 1.0), repeat=int(free.sum())))
+        steps = np.vstack([steps, part])
+    return steps
 
 
 @lru_cache(maxsize=8)

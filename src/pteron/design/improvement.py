@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -48,12 +49,12 @@ def improve_design(task: Task, point: Sequence[float], objective: int) -> list[f
         geometry = geometry_slopes(task.robot, task.variables, point)
     except ModelError:  # at the end of what can be made
         return list(point)
-    center, radius = search_ball(design.robot)
-    lengths = len(center)
+    lengths = len(task.robot.platform.lengths)
     seeks = task.seeks_place
     shape, least = task.shape
     fit, reach = np.zeros(lengths + 1), np.zeros((lengths + 1, 2))
     if seeks:
+        center, radius = search_ball(design.robot)
         fit = np.append(design.cube.center, design.cube.edge)
         reach = np.append(center, radius)[:, None] + [-radius, radius]
         reach[-1, 0] = min((1.0 + _SPARE) * least, fit[-1])
@@ -83,12 +84,12 @@ def improve_design(task: Task, point: Sequence[float], objective: int) -> list[f
 
 def _condition_samples(design: Design, lengths: int, count: int) -> Samples:
     """Return sample poses at which conditions are imposed: in the workspace, the cube, or both."""
-    task = design.task
-    moving = shape_samples(task.shape[0], task.orientations, count)
-    if task.spec.workspace is None or task.floats:
-        return moving
-    fixed = fixed_samples(design.poses, lengths)
-    return fixed.join(moving) if task.seeks_cube else fixed
+    task, parts = design.task, list[Samples]()
+    if task.spec.workspace is not None and not task.floats:
+        parts.append(fixed_samples(design.poses, lengths))
+    if task.seeks_place:
+        parts.append(shape_samples(task.shape[0], task.orientations, count))
+    return reduce(Samples.join, parts)
 
 
 @dataclass(frozen=True)

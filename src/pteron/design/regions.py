@@ -21,6 +21,9 @@ from pteron.workspace.shape_samples import Shape
 _RING = 24
 """Points round a cylinder's rim."""
 
+_TILTS, _TURNS = 6, 3
+"""Sampled directions of the greatest tilt, beside the level one, and sampled turns of a range."""
+
 
 def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float]:
     """Return a workspace's shape in `count` coordinates, scaled to edge 1, and its edge, m."""
@@ -79,7 +82,7 @@ def _positions(workspace: WorkspaceTable, count: int) -> Array:
 
 
 def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
-    """Return a workspace, scaled by `share`, as a region at a pose's orientation."""
+    """Return the places of a workspace, scaled by `share`, at a pose's orientation."""
     if table.shape == "cylinder":
         assert table.radius is not None  # the shape says so
         assert table.height is not None
@@ -89,6 +92,94 @@ def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> 
     low, high = (np.array(end) for end in table.ends)
     inset = 0.5 * (1.0 - share) * (high - low)
     return Box(placed_pose(pose, low + inset), placed_pose(pose, high - inset))
+
+
+@dataclass(frozen=True)
+class OrientedRegion:
+    """Poses at the places of a region, at all orientations of a range.
+
+    The tilt is the angle between the platform's z axis and its direction at angles zero: its cosine
+    is the product of the cosines of the two angles that tilt the platform.
+
+    Parameters
+    ----------
+    places : Region
+        The places, at one orientation.
+    low, high : tuple of float
+        Least and greatest angles of the pose, rad; those that tilt the platform come first.
+    tilt : float, optional
+        Greatest tilt, rad, of a platform that tilts.
+    """
+
+    places: Region
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    tilt: float | None = None
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest pose of the box around the region (2, m)."""
+        box = self.places.box.copy()
+        box[:, -len(self.low) :] = self.low, self.high
+        return box
+
+    def holds(self, poses: Array) -> NDArray[np.bool_]:
+        """Return whether poses (..., m) lie in the region."""
+        return self.places.holds(self._level(poses)) & ~self._turned_away(poses, poses, 0.0)
+
+    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return for boxes with corners (B, m) whether each certainly lies outside the region."""
+        apart = self.places.misses(self._level(low), self._level(high))
+        return apart | self._turned_away(low, high, 1e-12)
+
+    def _level(self, poses: Array) -> Array:
+        """Return poses (..., m) with the angles at which the region of places is defined."""
+        level = poses.copy()
+        level[..., -len(self.low) :] = self.places.box[0, -len(self.low) :]
+        return level
+
+    def _turned_away(self, low: Array, high: Array, slack: float) -> NDArray[np.bool_]:
+        """Return whether boxes (..., m) hold no orientation of the range, up to a slack."""
+        first, last = low[..., -len(self.low) :], high[..., -len(self.low) :]
+        away = ((first > self.high) | (last < self.low)).any(axis=-1)
+        if self.tilt is None:
+            return np.asarray(away)
+        least = np.clip(0.0, first[..., :2], last[..., :2])
+        return np.asarray(away | (np.cos(least).prod(axis=-1) < np.cos(self.tilt) - slack))
+
+
+def oriented_region(
+    places: Region, workspace: WorkspaceTable | None, platform: Platform, share: float = 1.0
+) -> Region:
+    """Return a region of places at all orientations of a workspace, their ranges scaled."""
+    if workspace is None or not workspace.has_ranges:
+        return places
+    low, high = places.box[:, platform.angular]
+    if workspace.tilt is not None:
+        low[:2], high[:2] = -share * workspace.tilt, share * workspace.tilt
+    if workspace.turn is not None:
+        middle, half = np.mean(workspace.turn), 0.5 * share * np.ptp(workspace.turn)
+        low[-1], high[-1] = middle - half, middle + half
+    tilt = None if workspace.tilt is None else share * workspace.tilt
+    return OrientedRegion(places, tuple(low.tolist()), tuple(high.tolist()), tilt)
+
+
+def sampled_orientations(
+    workspace: WorkspaceTable | None, platform: Platform, poses: Array
+) -> Array:
+    """Return poses (A, m) at sampled tilts and turns of a workspace, about each of poses (B, m)."""
+    if workspace is not None and workspace.tilt is not None:
+        rim = 2.0 * np.pi * np.arange(_TILTS) / _TILTS
+        sine, cosine = np.sin(workspace.tilt), np.cos(workspace.tilt)
+        leans = np.arctan2(-sine * np.sin(rim), cosine), np.arcsin(sine * np.cos(rim))
+        poses = np.repeat(poses[:, None], 1 + _TILTS, axis=1)
+        poses[..., np.flatnonzero(platform.angular)[:2]] = np.vstack([[0.0, 0.0], np.c_[leans]])
+        poses = poses.reshape(-1, poses.shape[-1])
+    if workspace is not None and workspace.turn is not None:
+        poses = np.repeat(poses[:, None], _TURNS, axis=1)
+        poses[..., -1] = np.linspace(*workspace.turn, _TURNS)
+        poses = poses.reshape(-1, poses.shape[-1])
+    return poses
 
 
 def placed_pose(pose: Array, position: Array) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from pteron.design.differences import (
     stroke_words,
 )
 from pteron.design.front import Front
-from pteron.design.proofs import Proved, place_words, prove_design, workspace_share
+from pteron.design.proofs import Proved, is_sampled, place_words, prove_design, workspace_share
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
@@ -59,10 +59,12 @@ class ReportedDesign(Proved):
             lines.append("cube: not proved" if self.cube is None else f"cube {self.cube.words}")
         if task.floats:
             lines.append(self._place)
-        for proof in self.workspace:
+        sampled = is_sampled(task, self.workspace)
+        for proof in self.workspace[-1:] if sampled else self.workspace:
             share = workspace_share(self.design, proof)
             part = "" if share == 1.0 else f", {100.0 * share:g} % of it,"
-            lines.append(f"workspace{part} {proof}")
+            count = f" at {len(self.workspace)} sampled orientations alone," if sampled else ""
+            lines.append(f"workspace{part}{count} {proof}")
         return lines
 
     @property
@@ -128,6 +130,10 @@ class ReportedDesign(Proved):
             boxes = sum(proof.boxes for proof in self.cube.proofs)
             cube = {"center": self.cube.center.tolist(), "edge": self.cube.edge, "boxes": boxes}
             contents["proved_cube"] = cube
+        if design.task.has_ranges:
+            contents["orientations_proved"] = (
+                "sampled" if is_sampled(design.task, self.workspace) else "all"
+            )
         contents["workspace_proved"] = [proof.holds for proof in self.workspace]
         contents["workspace_share"] = [workspace_share(design, proof) for proof in self.workspace]
         return contents

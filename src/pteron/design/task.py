@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.design.quantities import DesignQuantity, quantities
-from pteron.design.regions import workspace_shape
+from pteron.design.regions import oriented_region, sampled_orientations, workspace_shape
 from pteron.design.spec import FloorsTable, Spec
 from pteron.design.spec_faults import spec_faults
 from pteron.design.user_quantities import code_digest
@@ -24,6 +24,7 @@ from pteron.motion import Motor, read_motors
 from pteron.motion.payload import payload_warning
 from pteron.renamed import former_attribute
 from pteron.toml import joined_faults
+from pteron.workspace import Region
 from pteron.workspace.conditions import conditions
 from pteron.workspace.shape_samples import Shape, cube
 from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditions
@@ -72,12 +73,6 @@ class Task:
             If the search does not suit the machine; all its faults are listed.
         """
         robot = load(spec.robot)
-        if not robot.platform.lengths:
-            raise ModelError(
-                f"a {robot.platform.motion} platform only turns, but a design is for places: it "
-                "needs one that moves",
-                subject=robot.name,
-            )
         faults = list(spec_faults(spec, robot))
         variables: tuple[Variable, ...] = ()
         motors: tuple[Motor, ...] = ()
@@ -165,12 +160,26 @@ class Task:
 
     @cached_property
     def orientations(self) -> Array:
-        """Poses (A, m) with the orientations of the search; their positions do not count."""
+        """Poses (A, m) with sampled orientations of the search; their positions do not count."""
+        return sampled_orientations(self.spec.workspace, self.robot.platform, self.stated_poses)
+
+    @cached_property
+    def stated_poses(self) -> Array:
+        """Poses (B, m) with the orientations that the file states; ranges are about them."""
         spec, angular = self.spec, self.robot.platform.angular
         pose = np.zeros(len(angular)) if spec.pose is None else np.array(spec.pose)
         if spec.angles is None:
             return pose[None]
         return np.where(angular, np.array(spec.angles)[:, None], pose)
+
+    @property
+    def has_ranges(self) -> bool:
+        """Whether the workspace has ranges of orientations, all of which are to be proved."""
+        return self.spec.workspace is not None and self.spec.workspace.has_ranges
+
+    def oriented_region(self, places: Region, share: float = 1.0) -> Region:
+        """Return a region of places at all orientations of the ranges, these scaled by `share`."""
+        return oriented_region(places, self.spec.workspace, self.robot.platform, share)
 
     @property
     def quantity_names(self) -> tuple[str, ...]:

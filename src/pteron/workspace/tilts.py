@@ -19,6 +19,7 @@ from pteron.kernels import Array
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.platforms import Platform
 from pteron.progress import Progress
 from pteron.renamed import former_attribute
 from pteron.result import Result
@@ -251,14 +252,19 @@ def largest_ball(
     return _largest_region(robot, reference, reach, tolerance, given, sizes, report)
 
 
+def has_level_axes(platform: Platform) -> bool:
+    """Return whether the axes of a platform, if it has two, are level and at right angles."""
+    return not platform.second_axis or (
+        abs(dot(platform.axis, platform.second_axis)) <= PARALLEL_TOLERANCE
+        and max(abs(platform.axis[2]), abs(platform.second_axis[2])) <= PARALLEL_TOLERANCE
+    )
+
+
 def _expect_tilting(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
     """Return the machine and the pose (m,); raise if the platform cannot tilt to every side."""
     machine = as_manipulator(robot)
     platform = machine.platform
-    upright = not platform.second_axis or (
-        abs(dot(platform.axis, platform.second_axis)) <= PARALLEL_TOLERANCE
-        and max(abs(platform.axis[2]), abs(platform.second_axis[2])) <= PARALLEL_TOLERANCE
-    )
+    upright = has_level_axes(platform)
     tilts = platform.tilts
     if not tilts or not upright:
         raise ModelError(
