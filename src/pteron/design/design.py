@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.design.placement import best_place
 from pteron.design.quantities import COVERS
 from pteron.design.regions import placed_pose, workspace_poses, workspace_region
 from pteron.design.spec import ROUNDING
@@ -85,18 +86,41 @@ class Design(Result):
 
     @cached_property
     def cube(self) -> Fit:
-        """The largest cube (or floating workspace) of feasible poses, by search or proof."""
+        """The largest cube of feasible poses, or the place of a workspace that floats.
+
+        Found by search, or proved.
+        """
         if self.known is not None:
             return self.known
+        return self.placed_without(np.empty((0, self.robot.freedom)), thorough=False)
+
+    @property
+    def placed_anywhere(self) -> Design:
+        """The design with a workspace that floats placed thoroughly; itself without."""
+        if not self.task.place_quantities:
+            return self
+        none = np.empty((0, self.robot.freedom))
+        return replace(self, known=self.placed_without(none, thorough=True))
+
+    def placed_without(self, failing: Array, *, thorough: bool) -> Fit:
+        """Return the largest cube, or the best place, that excludes infeasible poses (F, m)."""
+        fit = self.cube_without(failing) if len(failing) else self._largest_cube
+        if not self.task.place_quantities or fit.edge < self.task.shape[1]:
+            return fit
+        return best_place(self, fit, failing, thorough=thorough)
+
+    @cached_property
+    def _largest_cube(self) -> Fit:
+        """The largest cube, or floating workspace, of feasible poses, by search."""
         return self.cube_without(np.empty((0, self.robot.freedom)))
 
     def cube_without(self, failing: Array) -> Fit:
         """Return the largest cube of feasible poses that excludes the infeasible poses (F, m)."""
-        task, ball = self.task, search_ball(self.robot)
-        shape, _ = task.shape
+        task, (shape, _) = self.task, self.task.shape
         angles, poses = self.robot.platform.angular, task.orientations
         sampled = (failing[:, None, angles] == poses[:, angles]).all(axis=-1).any(axis=-1)
         poses = np.vstack([poses, failing[~sampled]])
+        ball = search_ball(self.robot)
         return largest_fit(task.conditions, self.geometry, poses, ball, failing, shape)
 
     @cached_property

@@ -12,7 +12,8 @@ import numpy as np
 from pteron.design.design import Design
 from pteron.design.evolution import distinct_front, lexicographic_best, pareto_front
 from pteron.design.proofs import counterexamples
-from pteron.design.rows import FAILED, MISSES, places, violations
+from pteron.design.rows import MISSES, places, violations
+from pteron.design.spec import FAILED
 from pteron.design.task import Task
 from pteron.errors import ModelError
 from pteron.html_table import Overview, frame_overview

@@ -1,16 +1,21 @@
-"""Refinement of a design by gradients: one objective improves under all other requirements."""
+"""Refinement of a design: one objective improves under all requirements.
+
+Objectives of the machine alone, and the size of a cube, are improved by gradients, others by Nelder
+and Mead's method.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
 
 from pteron.design.design import Design
+from pteron.design.placement import nelder_mead
 from pteron.design.proofs import counterexamples, prove_design
-from pteron.design.spec import ROUNDING
+from pteron.design.spec import FAILED, ROUNDING
 from pteron.design.task import Task
 from pteron.design.variables import geometry_slopes, slopes_of
 from pteron.errors import ModelError
@@ -26,13 +31,24 @@ _SPARE = 1e-4
 """Share by which a workspace that floats is kept larger than it must be: then all of it is proved,
 and not all but its rim."""
 
+_TOLERANCE = 1e-4
+"""Tolerance of the unknowns, as shares of their ranges."""
+
 _FIRST = 5
 """Points along a cube's edge in the first program."""
 
 
-def improve_design(task: Task, point: Sequence[float], objective: int) -> list[float]:
+_EVALUATIONS, _FIRST_STEP = 12, 0.1
+"""Evaluations for each unknown of an objective without gradients, and the first step of each as a
+share of its range."""
+
+
+def improve_design(
+    task: Task, point: Sequence[float], objective: int, *, hold: bool = True
+) -> list[float]:
     """Return variables (V,) of a design with a better objective; `point` itself if none is found.
 
+    The other objectives become no worse, unless `hold` is False.
     The unknowns are the variables, and the cube's centre and edge. Requirements on quantities of
     the machine alone are linearised; quantities that depend on poses are not constrained, so the
     caller evaluates the design again. If the proof of the workspace or the cube fails, the search
@@ -41,7 +57,10 @@ def improve_design(task: Task, point: Sequence[float], objective: int) -> list[f
     spec, start = task.spec, np.array(point)
     target = spec.objectives[objective]
     try:
-        design = prove_design(Design(task, task.machine(point))).design
+        design = Design(task, task.machine(point))
+        if task.quantities[target.quantity].cover not in ("machine", "proved"):
+            return _improve_sampled(design.placed_anywhere, start, objective, hold)
+        design = prove_design(design).design
         slopes = _Slopes(task, design, start)
         target_slopes = slopes.slopes_of_quantity(target.quantity)
         if target_slopes is None or not target_slopes.any() or design.margin < -ROUNDING:
@@ -69,7 +88,7 @@ def improve_design(task: Task, point: Sequence[float], objective: int) -> list[f
         np.vstack([task.ranges.T, reach]),
         shape,
         task.orientations if seeks else task.orientations[:0],
-        tuple(slopes.bounds(objective, z0)),
+        tuple(slopes.bounds(objective, z0, hold)),
     )
     first, dense = (_condition_samples(design, lengths, count) for count in (_FIRST, POINTS))
     for _ in range(_EXCHANGES):
@@ -80,6 +99,48 @@ def improve_design(task: Task, point: Sequence[float], objective: int) -> list[f
             break
         first = first.join(missed)
     return variables
+
+
+def _improve_sampled(design: Design, start: Array, objective: int, hold: bool) -> list[float]:
+    """Return variables (V,) with a better objective that depends on poses.
+
+    The unknowns are the variables and the place of a workspace that floats. There is no improvement
+    where the poses are those of the largest cube, which is sought anew for every design.
+    """
+    task, count = design.task, len(start)
+    if task.spec.workspace is None or design.margin < -ROUNDING:
+        return start.tolist()
+    (low, high), (shape, least), spec = task.ranges, task.shape, task.spec
+    most = [np.inf if k == objective or not hold else 0.0 for k in range(len(spec.objectives))]
+    fit = replace(design.cube, edge=least) if task.floats else None
+
+    def costs(trial: Design) -> Array:
+        """Return the objectives (M,) of a design, and the violation of all requirements."""
+        costs = [o.sign * trial.quantity(o.quantity) for o in spec.objectives]
+        parts = (r.violation(trial.quantity(r.quantity), FAILED) for r in spec.requirements)
+        return np.array([*costs, sum(parts)])
+
+    first = costs(design)
+    bounds = first + np.abs(first) * ROUNDING
+    bounds[:-1] = bounds[:-1] + most
+
+    def cost(units: Array) -> float:
+        """Return the objective at unknowns, as shares of ranges; infinite where infeasible."""
+        if (np.abs(units[:count] - 0.5) > 0.5).any():
+            return np.inf
+        known = fit and replace(fit, center=fit.center + least * shape.half * units[count:])
+        try:
+            variables = (low + units[:count] * (high - low)).tolist()
+            trial = Design(task, task.machine(variables), known)
+            values = costs(trial) if trial.margin >= 0.0 else bounds + np.inf
+        except ModelError:
+            return np.inf
+        return float(values[objective]) if (values <= bounds).all() else np.inf
+
+    units = np.append((start - low) / (high - low), np.zeros(len(shape.half) if fit else 0))
+    step = np.where(units > 0.5, -_FIRST_STEP, _FIRST_STEP)
+    best, _ = nelder_mead(cost, units, step, _EVALUATIONS * len(units), _TOLERANCE)
+    return np.asarray(low + best[:count] * (high - low)).tolist()
 
 
 def _condition_samples(design: Design, lengths: int, count: int) -> Samples:
@@ -117,10 +178,10 @@ class _Slopes:
         )
         return np.append(slopes, np.zeros(tail))
 
-    def bounds(self, objective: int, z0: Array) -> list[tuple[Array, float]]:
-        """Return linear bounds (row, offset) that keep the other objectives and requirements."""
+    def bounds(self, objective: int, z0: Array, hold: bool) -> list[tuple[Array, float]]:
+        """Return linear bounds (row, offset) that keep the requirements, and other objectives."""
         bounds = []
-        for k, target in enumerate(self.task.spec.objectives):
+        for k, target in enumerate(self.task.spec.objectives if hold else ()):
             row = self.slopes_of_quantity(target.quantity)
             if k != objective and row is not None:
                 bounds.append((-target.sign * row, float(-target.sign * row @ z0)))

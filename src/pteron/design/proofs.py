@@ -157,6 +157,8 @@ def proved_cube(design: Design) -> ProvedCube | None:
         If the size is capped, the edge is `least` at most.
         """
         fit = design.cube_without(failing) if len(failing) else design.cube
+        if placed:
+            fit = design.placed_without(failing, thorough=True)
         if not capped:
             return fit
         fits = fit.edge >= least * (1.0 - ROUNDING)
@@ -167,7 +169,11 @@ def proved_cube(design: Design) -> ProvedCube | None:
         return cube_proofs(design, fit.center, fit.edge)
 
     shares = _PLACED if capped else _SHARES
+    placed = bool(task.place_quantities)
     fitted = proved_fit(search, proofs, shape, shares, design.robot.freedom)
+    if fitted is None and placed:
+        placed = False
+        fitted = proved_fit(search, proofs, shape, shares, design.robot.freedom)
     if fitted is None:
         return None
     fit, proved = fitted

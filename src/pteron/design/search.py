@@ -15,15 +15,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from pteron.design.evolution import Evolution, latin_hypercube
 from pteron.design.front import Front, ProvedRows
 from pteron.design.improvement import improve_design
-from pteron.design.rows import FAILED, design_table, violations
-from pteron.design.spec import SearchTable, Spec
+from pteron.design.rows import design_table, violations
+from pteron.design.spec import FAILED, SearchTable, Spec
 from pteron.design.task import Task
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 
 _CHUNK = 4
 """Designs that one worker takes at a time."""
+
+Job: TypeAlias = tuple[list[float], int, bool]
+"""A design, the objective to improve or -1, and whether the other objectives are held."""
 
 
 def search(
@@ -184,10 +187,10 @@ def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
     tables: list[pl.DataFrame] = []
     proofs = ProvedRows(task, evaluation.prove)
     front: Front | None = None
-    used: set[tuple[bytes, int]] = set()
+    used: set[tuple[bytes, int, bool]] = set()
     for number in range(1, settings.generations + 1):
         designs = low + evolution.ask() * (high - low)
-        jobs = [(point, -1) for point in designs.tolist()]
+        jobs = [(point, -1, True) for point in designs.tolist()]
         if front is not None:
             jobs += _designs_to_improve(front, number, used)
         plan = {"generation": number, "designs": _digest(designs)}
@@ -217,11 +220,11 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
     return designs
 
 
-def evaluate_designs(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
-    """Return rows of (point, objective) jobs; unless objective < 0, improved in it by gradients."""
+def evaluate_designs(task: Task, jobs: Sequence[Job]) -> pl.DataFrame:
+    """Return rows of (point, objective, hold) jobs, improved in their objective unless it is -1."""
     with one_thread():
-        designs = [point if k < 0 else improve_design(task, point, k) for point, k in jobs]
-    return design_table(task, designs)
+        designs = [p if k < 0 else improve_design(task, p, k, hold=hold) for p, k, hold in jobs]
+    return design_table(task, designs, thorough=[k >= 0 for _, k, _ in jobs])
 
 
 def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
@@ -229,22 +232,26 @@ def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
     return design_table(task, designs, proofs=True)
 
 
-def _designs_to_improve(
-    front: Front, number: int, used: set[tuple[bytes, int]]
-) -> list[tuple[list[float], int]]:
-    """Return (design, objective) pairs to improve, spread over the front; each is new in `used`."""
+def _designs_to_improve(front: Front, number: int, used: set[tuple[bytes, int, bool]]) -> list[Job]:
+    """Return improvements of designs: of the best in each objective, and spread over the front.
+
+    Each is new in `used`. The best in an objective is improved in it at the cost of the others.
+    """
     spec = front.task.spec
     settings, objectives = spec.search, len(spec.objectives)
     count = settings.refined
     if number == settings.generations and count:
         count = settings.population  # the last word on the whole front
+    spread = np.unique(np.linspace(0, len(front) - 1, count).round().astype(int))
+    best = list(front.selection.values())[:objectives] if count else []
+    candidates = [(at, k, False) for k, at in enumerate(best)]
+    if objectives > 1:
+        candidates += [(at, (number + k) % objectives, True) for k, at in enumerate(spread)]
     jobs = []
-    spread = np.linspace(0, len(front) - 1, count).round().astype(int)
-    for k, at in enumerate(np.unique(spread)):
-        candidate = front.values[at], (number + k) % objectives
-        if (key := (candidate[0].tobytes(), candidate[1])) not in used:
+    for at, objective, hold in candidates:
+        if (key := (front.values[at].tobytes(), objective, hold)) not in used:
             used.add(key)
-            jobs.append((candidate[0].tolist(), candidate[1]))
+            jobs.append((front.values[at].tolist(), objective, hold))
     return jobs
 
 

@@ -199,6 +199,15 @@ class Task:
         """Whether each design has a shape to be placed: the largest cube, or the workspace."""
         return self.seeks_cube or self.floats
 
+    @cached_property
+    def place_quantities(self) -> tuple[str, ...]:
+        """The quantities for which a workspace that floats is placed: those that depend on it.
+
+        There are none where its place is fixed, or is where it could be largest, for `scale`.
+        """
+        names = self.quantity_names if self.floats and "scale" not in self.quantity_names else ()
+        return tuple(n for n in names if self.quantities[n].cover not in ("machine", "proved"))
+
     @property
     def ranges(self) -> Array:
         """Lower and upper bounds of the design variables, (2, V)."""
