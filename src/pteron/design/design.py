@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pteron.design.placement import best_place
 from pteron.design.quantities import COVERS
-from pteron.design.regions import placed_pose, workspace_poses, workspace_region
+from pteron.design.regions import OrientedRegion, placed_pose, workspace_poses, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.design.workspace_tables import WorkspaceTable
@@ -201,6 +201,8 @@ class Design(Result):
             step = step / 2.0
             around = np.clip(worst[:, None] + step[:, None] * offsets, low[:, None], high[:, None])
             for region, pose, neighbours in zip(regions, worst, around, strict=True):
+                if isinstance(region, OrientedRegion):
+                    region.onto_cone(neighbours)
                 neighbours[~region.holds(neighbours)] = pose
             nearby = sign * of(self, around.reshape(-1, self.robot.freedom))
             nearby = np.nan_to_num(nearby, nan=-np.inf).reshape(len(worst), -1)

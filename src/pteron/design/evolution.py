@@ -18,8 +18,8 @@ def _pymoo(module: str) -> Any:
 
 
 EQUAL = 1e-3
-"""Share of a value by which two values of an objective may differ and count as equal. Chosen: tables
-show four digits, and no builder holds an index or a length of a whole machine to a per mille."""
+"""Share of a value by which two values of an objective may differ and count as equal. Chosen:
+tables show four digits, and no builder holds an index or all of a machine's lengths to 0.1 %."""
 
 
 def count_tolerances(costs: Array) -> Array:

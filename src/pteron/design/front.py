@@ -108,7 +108,8 @@ class Front(Result):
     def selection(self) -> dict[str, int]:
         """Row indices of the designs in a report: best in each objective, and the compromise.
 
-        Where several are equally good in an objective, the others decide, in their order. The compromise is the design nearest to the best value of all objectives at once, each
+        Where several are equally good in an objective, the others decide, in their order. The
+        compromise is the design nearest to the best value of all objectives at once, each
         objective scaled by its range over the front; with one objective there is none.
         """
         costs, objectives = self.task.costs(self.designs), self.task.spec.objectives

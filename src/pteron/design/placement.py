@@ -1,4 +1,4 @@
-"""The place of a workspace that floats: where a design's objective is best, among feasible places."""
+"""The place of a workspace that floats: the feasible one at which the objective is best."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def best_place(design: Any, fit: Fit, failing: Array, *, thorough: bool) -> Fit:
     """Return the place at which the first objective that depends on the place is best.
 
     The conditions hold there, and requirements that depend on the place come first. Nelder and
-    Mead's method starts from a fit with room to move and, in a thorough search, also from the best of
-    a lattice of feasible places.
+    Mead's method starts from a fit with room to move and, in a thorough search, also from the best
+    of a lattice of feasible places.
 
     Parameters
     ----------

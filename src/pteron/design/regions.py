@@ -22,7 +22,7 @@ _RING = 24
 """Points round a cylinder's rim."""
 
 _TILTS, _TURNS = 6, 3
-"""Sampled directions of the greatest tilt, beside the level one, and sampled turns of a range."""
+"""Sampled directions of the greatest tilt, beside the level one, and angles of a range."""
 
 
 def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float]:
@@ -132,6 +132,15 @@ class OrientedRegion:
         apart = self.places.misses(self._level(low), self._level(high))
         return apart | self._turned_away(low, high, 1e-12)
 
+    def onto_cone(self, poses: Array) -> None:
+        """Reduce the angles of poses (..., m) that tilt the platform too far to the greatest tilt."""
+        if self.tilt is not None:
+            first, second = np.moveaxis(poses[..., -len(self.low) :][..., :2], -1, 0)
+            azimuths = np.arctan2(-np.sin(first) * np.cos(second), np.sin(second))
+            leans = np.arccos(np.cos(first) * np.cos(second))
+            leans = np.minimum(leans, (1.0 - 1e-9) * self.tilt)
+            poses[..., -len(self.low) :][..., :2] = _tilt_angles(leans, azimuths)
+
     def _level(self, poses: Array) -> Array:
         """Return poses (..., m) with the angles at which the region of places is defined."""
         level = poses.copy()
@@ -157,27 +166,34 @@ def oriented_region(
     low, high = places.box[:, platform.angular]
     if workspace.tilt is not None:
         low[:2], high[:2] = -share * workspace.tilt, share * workspace.tilt
-    if workspace.turn is not None:
-        middle, half = np.mean(workspace.turn), 0.5 * share * np.ptp(workspace.turn)
-        low[-1], high[-1] = middle - half, middle + half
+    for name, (first, last) in (workspace.angles or {}).items():
+        at, inset = platform.angles.index(name), 0.5 * (1.0 - share) * (last - first)
+        low[at], high[at] = first + inset, last - inset
     tilt = None if workspace.tilt is None else share * workspace.tilt
     return OrientedRegion(places, tuple(low.tolist()), tuple(high.tolist()), tilt)
+
+
+def _tilt_angles(tilt: Array | float, azimuth: Array) -> Array:
+    """Return the two angles (..., 2) that tilt a platform, rad, towards an azimuth."""
+    across = np.sin(tilt) * np.cos(azimuth)
+    return np.stack(
+        [np.arctan2(-np.sin(tilt) * np.sin(azimuth), np.cos(tilt)), np.arcsin(across)], axis=-1
+    )
 
 
 def sampled_orientations(
     workspace: WorkspaceTable | None, platform: Platform, poses: Array
 ) -> Array:
-    """Return poses (A, m) at sampled tilts and turns of a workspace, about each of poses (B, m)."""
+    """Return poses (A, m) at sampled tilts and angles of a workspace, about each pose (B, m)."""
     if workspace is not None and workspace.tilt is not None:
         rim = 2.0 * np.pi * np.arange(_TILTS) / _TILTS
-        sine, cosine = np.sin(workspace.tilt), np.cos(workspace.tilt)
-        leans = np.arctan2(-sine * np.sin(rim), cosine), np.arcsin(sine * np.cos(rim))
+        leans = np.vstack([[0.0, 0.0], _tilt_angles(workspace.tilt, rim)])
         poses = np.repeat(poses[:, None], 1 + _TILTS, axis=1)
-        poses[..., np.flatnonzero(platform.angular)[:2]] = np.vstack([[0.0, 0.0], np.c_[leans]])
+        poses[..., np.flatnonzero(platform.angular)[:2]] = leans
         poses = poses.reshape(-1, poses.shape[-1])
-    if workspace is not None and workspace.turn is not None:
+    for name, ends in ((workspace and workspace.angles) or {}).items():
         poses = np.repeat(poses[:, None], _TURNS, axis=1)
-        poses[..., -1] = np.linspace(*workspace.turn, _TURNS)
+        poses[..., platform.coordinates.index(name)] = np.linspace(*ends, _TURNS)
         poses = poses.reshape(-1, poses.shape[-1])
     return poses
 

@@ -63,8 +63,10 @@ class ReportedDesign(Proved):
         for proof in self.workspace[-1:] if sampled else self.workspace:
             share = workspace_share(self.design, proof)
             part = "" if share == 1.0 else f", {100.0 * share:g} % of it,"
-            count = f" at {len(self.workspace)} sampled orientations alone," if sampled else ""
-            lines.append(f"workspace{part}{count} {proof}")
+            ranges = "" if task.spec.workspace is None else task.spec.workspace.range_words
+            if sampled:
+                ranges = f", at {len(self.workspace)} sampled orientations of its ranges alone"
+            lines.append(f"workspace{part.rstrip(',')}{ranges}{',' * bool(part or ranges)} {proof}")
         return lines
 
     @property
@@ -117,13 +119,13 @@ class ReportedDesign(Proved):
     def as_dict(self) -> dict[str, Any]:
         """Return the machine, its quantities and its proofs as plain data, SI units."""
         design, names = self.design, self.design.task.quantity_names
-        center = {"workspace_center": design.cube.center.tolist() if self.workspace else None}
+        center = design.cube.center.tolist() if design.task.floats and self.workspace else None
         changes = [] if self.name == "start" else [vars(change) for change in self.changes]
         contents = {
             "machine": machine_record(design.robot),
             **{name: design.quantity(name) for name in names},
             "known": {name: self._reasons[name] or design.cover(name) for name in names},
-            **(center if design.task.floats else {}),
+            **({"workspace_center": center} if design.task.floats else {}),
             "changes": changes,
         }
         if self.cube is not None:

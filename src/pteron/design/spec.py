@@ -287,6 +287,7 @@ class Spec(TomlTable):
             for part in self.objectives
         ]
         lines += [part.words for part in self.requirements]
+        lines += [] if self.workspace is None else [self.workspace.words]
         lines += [
             f"{name} at least {floor:.12g} everywhere"
             for name, floor in self.floors

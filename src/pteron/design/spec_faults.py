@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pteron.design.kinds import angle_counts
 from pteron.design.regions import workspace_poses
 from pteron.design.spec import Spec
 from pteron.design.workspace_tables import WorkspaceTable
@@ -23,7 +22,7 @@ def spec_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
     if spec.pose is not None and len(spec.pose) != robot.freedom:
         yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
     if spec.angles is not None and robot.platform.axis_angle is None:
-        turns = "tilts: give its orientation in pose, or tilt and turn in [workspace]"
+        turns = "tilts: give its orientation in pose, or tilt and angles in [workspace]"
         turns = turns if robot.platform.angles else "does not turn"
         yield f"angles: given, but the platform of {robot.name} {turns}; leave it out"
     yield from (f"workspace: {fault}" for fault in _workspace_faults(spec, robot))
@@ -33,7 +32,7 @@ def spec_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
     names = set(spec.quantity_names) - spec.user_quantities.keys()
     if not robot.platform.lengths:
         if spec.workspace is None:
-            yield f"workspace: missing; {robot.name} only turns, and needs one with tilt or turn"
+            yield f"workspace: missing; {robot.name} only turns, and needs one with tilt or angles"
         for name in sorted(names & _OF_PLACES):
             yield f"{name}: about places, but {robot.name} only turns"
     units = {leg.joint.force_unit for leg in robot.legs}
@@ -77,20 +76,20 @@ def _workspace_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
 
 def _range_faults(spec: Spec, workspace: WorkspaceTable, robot: Manipulator) -> Iterator[str]:
     """Yield sentences on ranges of orientations that contradict a search's machine or pose."""
-    platform = robot.platform
-    tilting, turning = angle_counts(platform)
-    if workspace.tilt is not None and not tilting:
-        yield f"tilt: given, but the platform of {robot.name} does not tilt; leave it out"
-    elif workspace.tilt is not None and not has_level_axes(platform):
-        yield f"tilt: the axes of {robot.name} are not level and at right angles; leave it out"
-    elif workspace.tilt is not None and spec.pose is not None:
-        angles = np.array(spec.pose)[platform.angular] if len(spec.pose) == robot.freedom else [0.0]
-        if np.any(angles[:2]):
-            yield "tilt: it is about the level platform; leave its tilt out of pose"
-    if workspace.turn is not None and not turning:
-        yield f"turn: given, but the platform of {robot.name} does not turn about its axis"
-    elif workspace.turn is not None and spec.angles is not None:
-        yield "turn: given with angles; give one of them"
+    platform, ranges = robot.platform, workspace.angles or {}
+    for name in sorted(ranges.keys() - set(platform.angles)):
+        names = ", ".join(platform.angles) or "none"
+        yield f"angles: {name} given, but the angles of {robot.name} are {names}"
+    if ranges and spec.angles is not None:
+        yield "angles: given here and before the tables; give one of them"
+    if workspace.tilt is None:
+        return
+    if not platform.tilts or not has_level_axes(platform):
+        yield f"tilt: {robot.name} does not tilt to every side; give the ranges of its angles"
+    elif ranges.keys() & set(platform.angles[:2]):
+        yield f"tilt: given with a range of {' or '.join(platform.angles[:2])}; give one of them"
+    elif spec.pose is not None and any(spec.pose[len(platform.lengths) :][:2]):
+        yield "tilt: it is about the level platform; leave its tilt out of pose"
 
 
 _OF_PLACES = {"cube", "scale", "speed", "force", "drive_load"}

@@ -103,8 +103,10 @@ class Task:
         """
         spec = self.spec.model_dump(mode="json", exclude={"robot"})
         spec = {key: part for key, part in spec.items() if part or key not in _LATER}
-        if spec["workspace"] is not None and spec["workspace"]["sides"] is None:
-            del spec["workspace"]["sides"]
+        if spec["workspace"] is not None:
+            table = spec["workspace"]
+            later = {key for key in ("sides", "tilt", "angles") if table[key] is None}
+            spec["workspace"] = {key: table[key] for key in table.keys() - later}
         plan: dict[str, Any] = {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
         if self.motors:
             plan["motors"] = [vars(motor) for motor in self.motors]
@@ -113,6 +115,8 @@ class Task:
         covers = {self.quantities[name].cover for name in self.quantity_names}
         if covers & {"places", "fine", "directions", "bound"}:
             plan["definition of its quantities"] = _WORST
+        if self.place_quantities:
+            plan["place of its workspace"] = "for the first objective that depends on it"
         return plan
 
     @cached_property

@@ -73,11 +73,11 @@ Place = Annotated[Three, AfterValidator(_expect_near)]
 
 
 class WorkspaceTable(TomlTable):
-    """`[workspace]`: the region in which the machine must work, and the orientations it needs there.
+    """`[workspace]`: the region in which the machine must work, and its orientations there.
 
     A box given by its sides, a cube or a cylinder may have no center: then it floats, and each
     design has it where the machine does best. A machine that only turns has no places: its
-    workspace is a tilt, a turn, or both.
+    workspace is a tilt, ranges of angles, or both.
     """
 
     low: tuple[Number, ...] | None = key("a box's least x, y, z, m", None)
@@ -93,8 +93,8 @@ class WorkspaceTable(TomlTable):
     tilt: Annotated[Positive, AfterValidator(_expect_tilt)] | None = key(
         "of the platform to every side, rad: all tilts up to it are needed", None
     )
-    turn: Annotated[Two, AfterValidator(_expect_turn)] | None = key(
-        "least and greatest turn about the platform's axis, rad", None
+    angles: dict[str, Annotated[Two, AfterValidator(_expect_turn)]] | None = key(
+        "least and greatest value of angles of the pose, rad, by name", None
     )
     samples: Annotated[int, Field(ge=2, le=41, strict=True)] = key(
         "poses along each of its sides", 5
@@ -104,8 +104,8 @@ class WorkspaceTable(TomlTable):
     @classmethod
     def _add_no_place(cls, table: Any) -> Any:
         """Return the table; one that states orientations alone has a box of no coordinates."""
-        if isinstance(table, dict) and {"tilt", "turn"} & set(table) >= set(table) - {"samples"}:
-            return table | {"low": (), "high": ()} if set(table) - {"samples"} else table
+        if isinstance(table, dict) and set() < set(table) - {"samples"} <= {"tilt", "angles"}:
+            return table | {"low": (), "high": ()}
         return table
 
     @model_validator(mode="after")
@@ -142,9 +142,24 @@ class WorkspaceTable(TomlTable):
         return self.low is None and self.center is None
 
     @property
+    def words(self) -> str:
+        """The workspace's shape, size and place as text."""
+        sizes = " x ".join(f"{1e3 * side:.4g}" for side in self.dimensions(self.lengths or 1))
+        text = f"{self.shape} of {sizes} mm" if sizes else "orientations"
+        text += ", wherever the machine does best" if self.floats else ""
+        return f"workspace: {text}{self.range_words}"
+
+    @property
+    def range_words(self) -> str:
+        """The ranges of orientations as text that follows; empty without."""
+        tilt = "" if self.tilt is None else f", at every tilt up to {self.tilt:g} rad"
+        ranges = (f", {name} {a:g} to {b:g} rad" for name, (a, b) in (self.angles or {}).items())
+        return tilt + "".join(ranges)
+
+    @property
     def has_ranges(self) -> bool:
         """Whether the machine must reach ranges of orientations."""
-        return self.tilt is not None or self.turn is not None
+        return self.tilt is not None or bool(self.angles)
 
     def with_center(self, center: Iterable[float]) -> Self:
         """Return a copy of the workspace centred at `center` (k,), m."""
