@@ -129,7 +129,9 @@ def compared_fronts(robot: str) -> None:
 def compared_best(robot: str, seed: int) -> None:
     """Print the best value of a search with drawn ranges, and of ten times as many by chance."""
     rng, given = np.random.default_rng(seed), _FRONTS[robot]
-    variables = [v | {"range": tuple(rng.uniform((0.6, 1.1), (0.9, 1.6)))} for v in given["variables"]]
+    variables = [
+        v | {"range": tuple(rng.uniform((0.6, 1.1), (0.9, 1.6)))} for v in given["variables"]
+    ]
     table = given | {"variables": variables, "objectives": [{"minimise": _BEST[robot]}]}
     if "workspace" not in given:
         table["requirements"] = [{"quantity": "cube", "least": rng.uniform(0.1, 0.2)}]

@@ -1,4 +1,4 @@
-"""Workspaces of a design search: ranges of orientations, places for the objective, equal designs."""
+"""Workspaces of a search: ranges of orientations, places for the objective; equal designs."""
 
 from dataclasses import replace
 from itertools import product
@@ -9,7 +9,6 @@ from mechanisms import CLIENTS
 
 from pteron.design import Design, ReportedDesign, Spec, Task, prove_design, search
 from pteron.design.evolution import distinct_front, lexicographic_best
-from pteron.design.regions import OrientedRegion
 from pteron.design.rows import evaluate_design
 from pteron.errors import DataError
 from pteron.indices import evaluate
@@ -17,6 +16,7 @@ from pteron.kinematics import rotation_of
 from pteron.workspace import conditions
 from pteron.workspace.conditions import keeps
 from pteron.workspace.fit import Fit
+from pteron.workspace.tilts import OrientedRegion
 
 
 def factor(moves, low, high):

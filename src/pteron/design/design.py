@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pteron.design.placement import best_place
 from pteron.design.quantities import COVERS
-from pteron.design.regions import OrientedRegion, placed_pose, workspace_poses, workspace_region
+from pteron.design.regions import placed_pose, workspace_poses, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.design.workspace_tables import WorkspaceTable
@@ -28,6 +28,7 @@ from pteron.result import Result
 from pteron.workspace import Box, Region
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
 from pteron.workspace.shape_samples import cube, shape_samples
+from pteron.workspace.tilts import OrientedRegion
 
 _STARTS = 8
 """Number of worst sample poses that local refinement starts from."""

@@ -13,9 +13,9 @@ from functools import reduce
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.placement import nelder_mead
+from pteron.design.placement import nelder_mead, sampled_cost
 from pteron.design.proofs import counterexamples, prove_design
-from pteron.design.spec import FAILED, ROUNDING
+from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.design.variables import geometry_slopes, slopes_of
 from pteron.errors import ModelError
@@ -110,19 +110,12 @@ def _improve_sampled(design: Design, start: Array, objective: int, hold: bool) -
     task, count = design.task, len(start)
     if task.spec.workspace is None or design.margin < -ROUNDING:
         return start.tolist()
-    (low, high), (shape, least), spec = task.ranges, task.shape, task.spec
-    most = [np.inf if k == objective or not hold else 0.0 for k in range(len(spec.objectives))]
+    (low, high), (shape, least) = task.ranges, task.shape
     fit = replace(design.cube, edge=least) if task.floats else None
-
-    def costs(trial: Design) -> Array:
-        """Return the objectives (M,) of a design, and the violation of all requirements."""
-        costs = [o.sign * trial.quantity(o.quantity) for o in spec.objectives]
-        parts = (r.violation(trial.quantity(r.quantity), FAILED) for r in spec.requirements)
-        return np.array([*costs, sum(parts)])
-
-    first = costs(design)
-    bounds = first + np.abs(first) * ROUNDING
-    bounds[:-1] = bounds[:-1] + most
+    targets = task.spec.objectives if hold else ()
+    most = np.array([o.sign * design.quantity(o.quantity) for o in targets])
+    most = np.append(most, np.full(len(task.spec.objectives) - len(most), np.inf))
+    most[objective] = np.inf
 
     def cost(units: Array) -> float:
         """Return the objective at unknowns, as shares of ranges; infinite where infeasible."""
@@ -132,10 +125,9 @@ def _improve_sampled(design: Design, start: Array, objective: int, hold: bool) -
         try:
             variables = (low + units[:count] * (high - low)).tolist()
             trial = Design(task, task.machine(variables), known)
-            values = costs(trial) if trial.margin >= 0.0 else bounds + np.inf
+            return sampled_cost(trial, objective, most) if trial.margin >= 0.0 else np.inf
         except ModelError:
             return np.inf
-        return float(values[objective]) if (values <= bounds).all() else np.inf
 
     units = np.append((start - low) / (high - low), np.zeros(len(shape.half) if fit else 0))
     step = np.where(units > 0.5, -_FIRST_STEP, _FIRST_STEP)

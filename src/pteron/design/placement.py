@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
+from pteron.design.spec import FAILED, ROUNDING
 from pteron.kernels import Array
 from pteron.kernels.one_thread import one_thread
 from pteron.kinematics.sampling import search_ball
@@ -28,9 +29,6 @@ from each of two starts for a design that is proved."""
 _COARSE, _FINE, _MOST = 15, 7, 40
 """Places along each side of the box of all positions in reach, and of the box of the feasible ones;
 most of the latter at which quantities are evaluated."""
-
-_FAILED = 1e9
-"""Cost of a place at which a requirement is violated, above that of any other."""
 
 
 @one_thread()
@@ -68,6 +66,9 @@ def best_place(design: Any, fit: Fit, failing: Array, *, thorough: bool) -> Fit:
         failing=failing,
     )
     dense = shape_samples(shape, task.orientations, POINTS)
+    named = [objective.quantity for objective in task.spec.objectives]
+    objective = next((k for k, name in enumerate(named) if name in task.place_quantities), None)
+    free = np.full(len(named), np.inf)
 
     def placed(center: Array) -> Fit:
         """Return the fit of the workspace at a centre (k,)."""
@@ -78,7 +79,7 @@ def best_place(design: Any, fit: Fit, failing: Array, *, thorough: bool) -> Fit:
         z = np.append(center, edge)
         if not program.keeps(dense, z) or len(program.failing_samples(z).inside):
             return np.inf
-        return _place_cost(replace(design, known=placed(center)))
+        return sampled_cost(replace(design, known=placed(center)), objective, free)
 
     step = np.maximum(0.25 * (fit.edge - edge), _SPARE * least) * shape.half
     starts, evaluations = [fit.center], count * (_THOROUGH if thorough else _QUICK)
@@ -107,21 +108,22 @@ def nelder_mead(
     return answer.x, float(answer.fun)
 
 
-def _place_cost(design: Any) -> float:
-    """Return the cost of a design's place: its first objective there, or violated requirements."""
-    spec, names = design.task.spec, design.task.place_quantities
-    missed = sum(
-        requirement.violation(design.quantity(requirement.quantity), 1.0)
-        for requirement in spec.requirements
-        if requirement.quantity in names
-    )
-    if missed:
-        return _FAILED * (1.0 + float(missed))
-    for objective in spec.objectives:
-        if objective.quantity in names:
-            amount = objective.sign * design.quantity(objective.quantity)
-            return float(amount) if np.isfinite(amount) else _FAILED
-    return 0.0
+def sampled_cost(design: Any, objective: int | None, most: Array) -> float:
+    """Return an objective's cost in a design; what is missed by requirements comes before it.
+
+    `most` are the greatest costs of all objectives (M,). Without an objective the cost is 0.
+    """
+    spec = design.task.spec
+    missed = sum(r.violation(design.quantity(r.quantity), 1.0) for r in spec.requirements)
+    for k in np.flatnonzero(np.isfinite(most)).tolist():
+        excess = spec.objectives[k].sign * design.quantity(spec.objectives[k].quantity) - most[k]
+        missed += max(excess, 0.0) / (abs(most[k]) or 1.0)
+    if not missed <= ROUNDING:
+        return FAILED * (1.0 + float(np.nan_to_num(missed, nan=1.0)))
+    if objective is None:
+        return 0.0
+    target = spec.objectives[objective]
+    return float(np.nan_to_num(target.sign * design.quantity(target.quantity), nan=FAILED))
 
 
 def _feasible_lattice(design: Any, program: SemiInfiniteProgram, edge: float) -> Array:

@@ -17,7 +17,6 @@ import numpy as np
 from pteron.design.design import Design
 from pteron.design.rating import KindEvaluator, Rating
 from pteron.design.regions import (
-    OrientedRegion,
     kind_regions,
     placed_pose,
     sampled_orientations,
@@ -31,6 +30,7 @@ from pteron.result import Result
 from pteron.workspace import Box, Proof, Region, interference, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.shape_samples import Samples, fixed_samples
+from pteron.workspace.tilts import OrientedRegion
 
 _SHARES = (0.9999, 0.999, 0.995, 0.98, 0.95, 0.9, 0.75, 0.5, 0.25, 0.1)
 """Shares of the cube's edge that are tried in turn: at the whole edge some condition is zero, which

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,8 @@ from pteron.manipulator import Manipulator
 from pteron.motion.trajectories.tool import arm_motion, carries, tool_motion
 from pteron.platforms import Platform
 from pteron.workspace import Box, Cylinder, Region
-from pteron.workspace.shape_samples import Shape
+from pteron.workspace.shape_samples import Shape, shape_samples
+from pteron.workspace.tilts import OrientedRegion, tilt_angles
 
 _RING = 24
 """Points round a cylinder's rim."""
@@ -48,37 +48,13 @@ def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float
     return Shape(half, gauge, rim.reshape(-1, 3)), edge
 
 
-def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | None = None) -> Array:
-    """Return poses (N, m) over a workspace at orientations (A, m); with 2 samples its corners."""
-    positions = _positions(workspace, samples or workspace.samples)
-    poses = np.repeat(angles, len(positions), axis=0)
-    poses[:, : positions.shape[1]] = np.tile(positions, (len(angles), 1))
-    return poses
-
-
-def _positions(workspace: WorkspaceTable, count: int) -> Array:
-    """Return a grid of positions (N, k) over a workspace, its boundary included, m."""
-    line = np.linspace(-1.0, 1.0, count)
-    if workspace.shape != "cylinder":
-        low, high = (np.array(end) for end in workspace.ends)
-        units = np.array(list(product(line, repeat=len(low))))
-        return np.asarray((low + high) / 2.0 + units * (high - low) / 2.0)
-    assert workspace.radius is not None  # the shape says so
-    assert workspace.height is not None
-    axis = "xyz".index(workspace.axis)
-    turns = np.linspace(0.0, 2.0 * np.pi, 4 * count, endpoint=False)
-    radii = np.linspace(0.0, workspace.radius, max(2, (count + 1) // 2))
-    points = [
-        (r * np.cos(a), r * np.sin(a), h * workspace.height / 2.0)
-        for h in line
-        for r in radii
-        for a in (turns if r else turns[:1])
-    ]
-    # The last is along the axis.
-    order = [(axis + 1) % 3, (axis + 2) % 3, axis]
-    positions = np.empty((len(points), 3))
-    positions[:, order] = points
-    return np.asarray(positions + np.array(workspace.center))
+def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int) -> Array:
+    """Return poses (N, m) over a workspace at orientations (A, m); of a box 2 give its corners."""
+    center = np.mean(workspace.ends, axis=0)
+    if not len(center):
+        return angles
+    shape, edge = workspace_shape(workspace, len(center))
+    return shape_samples(shape, angles, samples).shape_poses(center, edge)
 
 
 def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
@@ -92,69 +68,6 @@ def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> 
     low, high = (np.array(end) for end in table.ends)
     inset = 0.5 * (1.0 - share) * (high - low)
     return Box(placed_pose(pose, low + inset), placed_pose(pose, high - inset))
-
-
-@dataclass(frozen=True)
-class OrientedRegion:
-    """Poses at the places of a region, at all orientations of a range.
-
-    The tilt is the angle between the platform's z axis and its direction at angles zero: its cosine
-    is the product of the cosines of the two angles that tilt the platform.
-
-    Parameters
-    ----------
-    places : Region
-        The places, at one orientation.
-    low, high : tuple of float
-        Least and greatest angles of the pose, rad; those that tilt the platform come first.
-    tilt : float, optional
-        Greatest tilt, rad, of a platform that tilts.
-    """
-
-    places: Region
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-    tilt: float | None = None
-
-    @property
-    def box(self) -> Array:
-        """Least and greatest pose of the box around the region (2, m)."""
-        box = self.places.box.copy()
-        box[:, -len(self.low) :] = self.low, self.high
-        return box
-
-    def holds(self, poses: Array) -> NDArray[np.bool_]:
-        """Return whether poses (..., m) lie in the region."""
-        return self.places.holds(self._level(poses)) & ~self._turned_away(poses, poses, 0.0)
-
-    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return for boxes with corners (B, m) whether each certainly lies outside the region."""
-        apart = self.places.misses(self._level(low), self._level(high))
-        return apart | self._turned_away(low, high, 1e-12)
-
-    def onto_cone(self, poses: Array) -> None:
-        """Reduce the angles of poses (..., m) that tilt the platform too far to the greatest tilt."""
-        if self.tilt is not None:
-            first, second = np.moveaxis(poses[..., -len(self.low) :][..., :2], -1, 0)
-            azimuths = np.arctan2(-np.sin(first) * np.cos(second), np.sin(second))
-            leans = np.arccos(np.cos(first) * np.cos(second))
-            leans = np.minimum(leans, (1.0 - 1e-9) * self.tilt)
-            poses[..., -len(self.low) :][..., :2] = _tilt_angles(leans, azimuths)
-
-    def _level(self, poses: Array) -> Array:
-        """Return poses (..., m) with the angles at which the region of places is defined."""
-        level = poses.copy()
-        level[..., -len(self.low) :] = self.places.box[0, -len(self.low) :]
-        return level
-
-    def _turned_away(self, low: Array, high: Array, slack: float) -> NDArray[np.bool_]:
-        """Return whether boxes (..., m) hold no orientation of the range, up to a slack."""
-        first, last = low[..., -len(self.low) :], high[..., -len(self.low) :]
-        away = ((first > self.high) | (last < self.low)).any(axis=-1)
-        if self.tilt is None:
-            return np.asarray(away)
-        least = np.clip(0.0, first[..., :2], last[..., :2])
-        return np.asarray(away | (np.cos(least).prod(axis=-1) < np.cos(self.tilt) - slack))
 
 
 def oriented_region(
@@ -173,21 +86,13 @@ def oriented_region(
     return OrientedRegion(places, tuple(low.tolist()), tuple(high.tolist()), tilt)
 
 
-def _tilt_angles(tilt: Array | float, azimuth: Array) -> Array:
-    """Return the two angles (..., 2) that tilt a platform, rad, towards an azimuth."""
-    across = np.sin(tilt) * np.cos(azimuth)
-    return np.stack(
-        [np.arctan2(-np.sin(tilt) * np.sin(azimuth), np.cos(tilt)), np.arcsin(across)], axis=-1
-    )
-
-
 def sampled_orientations(
     workspace: WorkspaceTable | None, platform: Platform, poses: Array
 ) -> Array:
     """Return poses (A, m) at sampled tilts and angles of a workspace, about each pose (B, m)."""
     if workspace is not None and workspace.tilt is not None:
         rim = 2.0 * np.pi * np.arange(_TILTS) / _TILTS
-        leans = np.vstack([[0.0, 0.0], _tilt_angles(workspace.tilt, rim)])
+        leans = np.vstack([[0.0, 0.0], tilt_angles(workspace.tilt, rim)])
         poses = np.repeat(poses[:, None], 1 + _TILTS, axis=1)
         poses[..., np.flatnonzero(platform.angular)[:2]] = leans
         poses = poses.reshape(-1, poses.shape[-1])

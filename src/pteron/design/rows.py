@@ -61,17 +61,15 @@ def places(task: Task) -> list[str]:
 
 
 def design_table(
-    task: Task, designs: ArrayLike, *, proofs: bool = False, thorough: Sequence[bool] = ()
+    task: Task, designs: ArrayLike, *, proofs: bool = False, thorough: bool = False
 ) -> pl.DataFrame:
     """Return a table of designs (N, V), a row each: variables, quantities and violations."""
     import polars as pl
 
     points = np.asarray(designs)
     with one_thread():
-        rows = [
-            evaluate_design(task, row, proofs=proofs, thorough=where)
-            for row, where in zip(points.tolist(), thorough or [False] * len(points), strict=True)
-        ]
+        depth = {"proofs": proofs, "thorough": thorough}
+        rows = [evaluate_design(task, row, **depth) for row in points.tolist()]
     columns = {v.name: points[:, k].tolist() for k, v in enumerate(task.variables)}
     return pl.DataFrame(columns | {name: [row[name] for row in rows] for name in rows[0]})
 

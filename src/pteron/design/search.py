@@ -222,9 +222,14 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
 
 def evaluate_designs(task: Task, jobs: Sequence[Job]) -> pl.DataFrame:
     """Return rows of (point, objective, hold) jobs, improved in their objective unless it is -1."""
+    import polars as pl
+
+    plain = [point for point, k, _ in jobs if k < 0]
     with one_thread():
-        designs = [p if k < 0 else improve_design(task, p, k, hold=hold) for p, k, hold in jobs]
-    return design_table(task, designs, thorough=[k >= 0 for _, k, _ in jobs])
+        better = [improve_design(task, p, k, hold=hold) for p, k, hold in jobs if k >= 0]
+    parts = [design_table(task, part, thorough=part is better) for part in (plain, better) if part]
+    rows: pl.DataFrame = pl.concat(parts)
+    return rows
 
 
 def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
