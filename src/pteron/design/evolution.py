@@ -43,7 +43,7 @@ def distinct_front(costs: Array) -> NDArray[np.int_]:
     for k in np.argsort(counts.sum(axis=1), kind="stable").tolist():
         if not (counts[chosen] <= counts[k] + 1.0).all(axis=1).any():
             chosen.append(k)
-    return front[np.sort(chosen)]
+    return np.asarray(front[np.sort(chosen)])
 
 
 def lexicographic_best(costs: Array, order: Sequence[int]) -> int:

@@ -113,13 +113,10 @@ class Front(Result):
         objective scaled by its range over the front; with one objective there is none.
         """
         costs, objectives = self.task.costs(self.designs), self.task.spec.objectives
-        every = range(len(objectives))
-        best_designs = {
-            f"best-{objective.quantity}": lexicographic_best(
-                costs, sorted(every, key=lambda j, k=k: j != k)
-            )
-            for k, objective in enumerate(objectives)
-        }
+        best_designs = {}
+        for k, objective in enumerate(objectives):
+            order = [k, *(j for j in range(len(objectives)) if j != k)]
+            best_designs[f"best-{objective.quantity}"] = lexicographic_best(costs, order)
         spans = np.ptp(costs, axis=0)
         shares = (costs - costs.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
         if len(objectives) > 1:

@@ -109,7 +109,7 @@ def _improve_sampled(design: Design, start: Array, objective: int, hold: bool) -
     """
     task, count = design.task, len(start)
     if task.spec.workspace is None or design.margin < -ROUNDING:
-        return start.tolist()
+        return list(map(float, start))
     (low, high), (shape, least) = task.ranges, task.shape
     fit = replace(design.cube, edge=least) if task.floats else None
     targets = task.spec.objectives if hold else ()
@@ -132,7 +132,7 @@ def _improve_sampled(design: Design, start: Array, objective: int, hold: bool) -
     units = np.append((start - low) / (high - low), np.zeros(len(shape.half) if fit else 0))
     step = np.where(units > 0.5, -_FIRST_STEP, _FIRST_STEP)
     best, _ = nelder_mead(cost, units, step, _EVALUATIONS * len(units), _TOLERANCE)
-    return np.asarray(low + best[:count] * (high - low)).tolist()
+    return list(map(float, low + best[:count] * (high - low)))
 
 
 def _condition_samples(design: Design, lengths: int, count: int) -> Samples:

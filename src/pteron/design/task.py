@@ -32,12 +32,10 @@ from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditio
 if TYPE_CHECKING:
     import polars as pl
 
-_WORST = "about the worst sampled poses too, forces and speeds over all directions"
-"""Where quantities are taken, in the plan of a search that asks for sampled ones: earlier searches,
-which took them elsewhere, cannot be resumed."""
-
-_LATER = {"payload", "cycles", "errors", "elasticity", "motors"}
-"""Keys that a spec may have since; without them its plan is as it was."""
+_DEFINITION = (
+    "worst values about the sampled poses too, workspaces that float placed for the objective"
+)
+"""Where quantities are taken, in a search's plan: one that took them elsewhere is not resumed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,22 +99,14 @@ class Task:
 
         Stored rows are reused only while this data is unchanged.
         """
-        spec = self.spec.model_dump(mode="json", exclude={"robot"})
-        spec = {key: part for key, part in spec.items() if part or key not in _LATER}
-        if spec["workspace"] is not None:
-            table = spec["workspace"]
-            later = {key for key in ("sides", "tilt", "angles") if table[key] is None}
-            spec["workspace"] = {key: table[key] for key in table.keys() - later}
+        spec = self.spec.model_dump(mode="json", exclude={"robot"}, exclude_none=True)
+        spec = {key: part for key, part in spec.items() if part != [] or key == "requirements"}
         plan: dict[str, Any] = {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
+        plan["definition of its quantities"] = _DEFINITION
         if self.motors:
             plan["motors"] = [vars(motor) for motor in self.motors]
         if quantities := self.spec.user_quantities:
             plan["user's quantities"] = {name: code_digest(q) for name, q in quantities.items()}
-        covers = {self.quantities[name].cover for name in self.quantity_names}
-        if covers & {"places", "fine", "directions", "bound"}:
-            plan["definition of its quantities"] = _WORST
-        if self.place_quantities:
-            plan["place of its workspace"] = "for the first objective that depends on it"
         return plan
 
     @cached_property
