@@ -54,6 +54,8 @@ class Design(Result):
         Its largest cube, or the place of its workspace, where that is proved.
     least : float
         The least row of the conditions over the required workspace that a proof has shown.
+    refined : bool
+        Whether worst values are sought about the worst sampled poses too; else at these alone.
     """
 
     SHOWN = "robot quantities"
@@ -62,6 +64,7 @@ class Design(Result):
     robot: Manipulator
     known: Fit | None = None
     least: float = np.inf
+    refined: bool = True
 
     def __repr__(self) -> str:
         """Return the names of the task's machine and of the design in one line."""
@@ -198,7 +201,7 @@ class Design(Result):
         low, high = np.stack([region.box for region in regions], axis=1)
         offsets = _neighbours((high > low).any(axis=0), self.robot.platform.angular)
         step = (high - low) / self._samples
-        for _ in range(_ROUNDS):
+        for _ in range(_ROUNDS if self.refined else 0):
             step = step / 2.0
             around = np.clip(worst[:, None] + step[:, None] * offsets, low[:, None], high[:, None])
             for region, pose, neighbours in zip(regions, worst, around, strict=True):

@@ -61,7 +61,7 @@ class Front(Result):
         """Return the counts of evaluated, feasible and Pareto-optimal designs in a line of text."""
         return (
             f"{self.task.robot.name}: {self.evaluated} designs evaluated, {self.kept} meet all "
-            f"requirements, {len(self)} Pareto-optimal (no other is better in every objective)"
+            f"requirements, {len(self)} on the Pareto front (less than 0.1 % apart is equal)"
         )
 
     def as_dict(self) -> dict[str, Any]:

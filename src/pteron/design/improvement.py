@@ -112,7 +112,7 @@ def _improve_sampled(design: Design, start: Array, objective: int, hold: bool) -
         return list(map(float, start))
     (low, high), (shape, least) = task.ranges, task.shape
     fit = replace(design.cube, edge=least) if task.floats else None
-    targets = task.spec.objectives if hold else ()
+    targets, design = task.spec.objectives if hold else (), replace(design, refined=False)
     most = np.array([o.sign * design.quantity(o.quantity) for o in targets])
     most = np.append(most, np.full(len(task.spec.objectives) - len(most), np.inf))
     most[objective] = np.inf
@@ -124,7 +124,7 @@ def _improve_sampled(design: Design, start: Array, objective: int, hold: bool) -
         known = fit and replace(fit, center=fit.center + least * shape.half * units[count:])
         try:
             variables = (low + units[:count] * (high - low)).tolist()
-            trial = Design(task, task.machine(variables), known)
+            trial = Design(task, task.machine(variables), known, refined=False)
             return sampled_cost(trial, objective, most) if trial.margin >= 0.0 else np.inf
         except ModelError:
             return np.inf

@@ -22,11 +22,11 @@ _SPARE = 1e-3
 """Share by which a workspace is larger while its place is sought, so that the proof can decide.
 Chosen: a place moves by no more than half this share of the workspace's side."""
 
-_QUICK, _THOROUGH = 8, 30
+_QUICK, _THOROUGH = 8, 20
 """Evaluations of the quantities for each coordinate of the place: while designs are sought, and
 from each of two starts for a design that is proved."""
 
-_COARSE, _FINE, _MOST = 15, 7, 40
+_COARSE, _FINE, _MOST = 15, 7, 30
 """Places along each side of the box of all positions in reach, and of the box of the feasible ones;
 most of the latter at which quantities are evaluated."""
 
@@ -79,7 +79,7 @@ def best_place(design: Any, fit: Fit, failing: Array, *, thorough: bool) -> Fit:
         z = np.append(center, edge)
         if not program.keeps(dense, z) or len(program.failing_samples(z).inside):
             return np.inf
-        return sampled_cost(replace(design, known=placed(center)), objective, free)
+        return sampled_cost(replace(design, known=placed(center), refined=False), objective, free)
 
     step = np.maximum(0.25 * (fit.edge - edge), _SPARE * least) * shape.half
     starts, evaluations = [fit.center], count * (_THOROUGH if thorough else _QUICK)

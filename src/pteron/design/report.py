@@ -221,7 +221,7 @@ class FrontReport(Result):
             f"# Designs of {front.task.robot.name}",
             "",
             f"{front.evaluated} designs were evaluated; {front.kept} meet all requirements; "
-            f"Pareto-optimal, that is bettered by no other in every objective: {len(front)}. A "
+            f"on the Pareto front, where values less than 0.1 % apart are equal: {len(front)}. A "
             "link of another "
             + (
                 "length is drawn out along itself: its mass grows with the length."
