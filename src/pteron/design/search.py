@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from pteron.design.evolution import Evolution, latin_hypercube
+from pteron.design.evolution import Evolution, count_tolerances, latin_hypercube
 from pteron.design.front import Front, ProvedRows
 from pteron.design.improvement import improve_design
 from pteron.design.rows import design_table, violations
@@ -192,7 +192,7 @@ def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
         designs = low + evolution.ask() * (high - low)
         jobs = [(point, -1, True) for point in designs.tolist()]
         if front is not None:
-            jobs += _designs_to_improve(front, number, used)
+            jobs += _designs_to_improve(front, tables, number, used)
         plan = {"generation": number, "designs": _digest(designs)}
         report = None if progress is None else partial(_report, progress, number, settings)
         tables.append(evaluation.rows(evaluate_designs, jobs, f"{number:04d}", plan, report))
@@ -237,10 +237,13 @@ def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
     return design_table(task, designs, proofs=True)
 
 
-def _designs_to_improve(front: Front, number: int, used: set[tuple[bytes, int, bool]]) -> list[Job]:
+def _designs_to_improve(
+    front: Front, tables: Sequence[pl.DataFrame], number: int, used: set[tuple[bytes, int, bool]]
+) -> list[Job]:
     """Return improvements of designs: of the best in each objective, and spread over the front.
 
-    Each is new in `used`. The best in an objective is improved in it at the cost of the others.
+    Each is new in `used`. The best in an objective is improved in it at the cost of the others. A
+    front of few designs, as with one objective, is joined by the next best feasible designs.
     """
     spec = front.task.spec
     settings, objectives = spec.search, len(spec.objectives)
@@ -249,14 +252,21 @@ def _designs_to_improve(front: Front, number: int, used: set[tuple[bytes, int, b
         count = settings.population  # the last word on the whole front
     spread = np.unique(np.linspace(0, len(front) - 1, count).round().astype(int))
     best = list(front.selection.values())[:objectives] if count else []
-    candidates = [(at, k, False) for k, at in enumerate(best)]
-    if objectives > 1:
-        candidates += [(at, (number + k) % objectives, True) for k, at in enumerate(spread)]
+    candidates = [(front.values[at], k, False) for k, at in enumerate(best)]
+    points = list(front.values[spread])
+    if len(spread) < count:
+        feasible = [table.filter(violations(table).sum(axis=1) == 0.0) for table in tables]
+        costs = np.vstack([front.task.costs(table) for table in feasible])
+        others = np.vstack([front.task.points(table) for table in feasible])
+        sums = np.nan_to_num(count_tolerances(np.nan_to_num(costs, nan=FAILED)).sum(axis=1))
+        points += list(others[np.argsort(sums, kind="stable")][: count - len(spread)])
+    candidates += [(point, (number + k) % objectives, True) for k, point in enumerate(points)]
     jobs = []
-    for at, objective, hold in candidates:
-        if (key := (front.values[at].tobytes(), objective, hold)) not in used:
+    for point, objective, hold in candidates:
+        hold = hold and objectives > 1
+        if (key := (point.tobytes(), objective, hold)) not in used:
             used.add(key)
-            jobs.append((front.values[at].tolist(), objective, hold))
+            jobs.append((point.tolist(), objective, hold))
     return jobs
 
 
