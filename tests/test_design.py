@@ -434,7 +434,7 @@ def test_a_survey_streams_and_goes_on(tmp_path):
 def test_what_cannot_be_is_told_with_what_comes_nearest():
     wide = {"center": (0.0, 0.0, 0.0), "edge": 0.9}
     asked = workspace_spec(workspace=wide, requirements=[{"quantity": "links", "most": 0.9}])
-    pattern = r"none of 8 designs .* the workspace is not kept \(leg \d: .* links at most 0.9 is"
+    pattern = r"none of 16 designs .* the workspace is not kept \(leg \d: .* links at most 0.9 is"
     with pytest.raises(ModelError, match=pattern):
         search(asked)
 

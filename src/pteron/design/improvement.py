@@ -31,6 +31,10 @@ _SPARE = 1e-4
 """Share by which a workspace that floats is kept larger than it must be: then all of it is proved,
 and not all but its rim."""
 
+_MOST = 6
+"""Most variables for which Nelder and Mead's method seeks the largest cube of each design: it takes
+longer than all else with more."""
+
 _TOLERANCE = 1e-4
 """Tolerance of the unknowns, as shares of their ranges."""
 
@@ -39,8 +43,8 @@ _FIRST = 5
 
 
 _EVALUATIONS, _FIRST_STEP = 12, 0.1
-"""Evaluations for each unknown of an objective without gradients, and the first step of each as a
-share of its range."""
+"""Evaluations for each unknown of an objective without gradients, twice, and the first step of each
+as a share of its range."""
 
 
 def improve_design(
@@ -98,17 +102,23 @@ def improve_design(
         if not len(missed.inside):
             break
         first = first.join(missed)
-    return variables
+    if hold:
+        return variables
+    try:
+        return _improve_sampled(
+            Design(task, task.machine(variables)), np.array(variables), objective, False
+        )
+    except ModelError:
+        return variables
 
 
 def _improve_sampled(design: Design, start: Array, objective: int, hold: bool) -> list[float]:
     """Return variables (V,) with a better objective that depends on poses.
 
-    The unknowns are the variables and the place of a workspace that floats. There is no improvement
-    where the poses are those of the largest cube, which is sought anew for every design.
+    The unknowns are the variables and the place of a workspace that floats.
     """
     task, count = design.task, len(start)
-    if task.spec.workspace is None or design.margin < -ROUNDING:
+    if design.margin < -ROUNDING or (task.seeks_cube and count > _MOST):
         return list(map(float, start))
     (low, high), (shape, least) = task.ranges, task.shape
     fit = replace(design.cube, edge=least) if task.floats else None
@@ -119,20 +129,20 @@ def _improve_sampled(design: Design, start: Array, objective: int, hold: bool) -
 
     def cost(units: Array) -> float:
         """Return the objective at unknowns, as shares of ranges; infinite where infeasible."""
-        if (np.abs(units[:count] - 0.5) > 0.5).any():
-            return np.inf
         known = fit and replace(fit, center=fit.center + least * shape.half * units[count:])
         try:
-            variables = (low + units[:count] * (high - low)).tolist()
+            variables = (low + np.clip(units[:count], 0.0, 1.0) * (high - low)).tolist()
             trial = Design(task, task.machine(variables), known, refined=False)
             return sampled_cost(trial, objective, most) if trial.margin >= 0.0 else np.inf
         except ModelError:
             return np.inf
 
     units = np.append((start - low) / (high - low), np.zeros(len(shape.half) if fit else 0))
-    step = np.where(units > 0.5, -_FIRST_STEP, _FIRST_STEP)
-    best, _ = nelder_mead(cost, units, step, _EVALUATIONS * len(units), _TOLERANCE)
-    return list(map(float, low + best[:count] * (high - low)))
+    for share in (1.0, 0.5):  # again, since a simplex shrinks to a face of what is feasible
+        step = share * np.where(units > 0.5, -_FIRST_STEP, _FIRST_STEP)
+        units, _ = nelder_mead(cost, units, step, _EVALUATIONS * len(units), _TOLERANCE)
+        units[:count] = np.clip(units[:count], 0.0, 1.0)
+    return list(map(float, low + units[:count] * (high - low)))
 
 
 def _condition_samples(design: Design, lengths: int, count: int) -> Samples:

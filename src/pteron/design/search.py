@@ -36,6 +36,9 @@ from pteron.shapes import Workers
 if TYPE_CHECKING:
     import polars as pl
 
+_FIRST = 3
+"""Size of the first generation, as a multiple of the others': it finds where designs are good."""
+
 _CHUNK = 4
 """Designs that one worker takes at a time."""
 
@@ -54,9 +57,9 @@ def search(
 ) -> Front:
     """Search for the Pareto-optimal designs of a machine and return their front.
 
-    The first generation is a Latin hypercube that includes the initial machine; NSGA-II makes the
-    others, and the best designs of each are improved by gradients. The same spec and seed give the
-    same front, on any computer, also after interruptions.
+    The first generation, of three times the population, is a Latin hypercube that includes the
+    initial machine; NSGA-II makes the others, and the best designs of each are improved. The same
+    spec and seed give the same front, on any computer, also after interruptions.
 
     Parameters
     ----------
@@ -178,8 +181,9 @@ def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
     """Run the generations of a search; return the front of all designs, each of it proved."""
     task = evaluation.task
     settings, (low, high) = task.spec.search, task.ranges
+    first = first_designs(task, _FIRST * settings.population, settings.seed)
     evolution = Evolution(
-        (first_designs(task, settings.population, settings.seed) - low) / (high - low),
+        (first[: settings.population] - low) / (high - low),
         len(task.spec.objectives),
         1 + len(task.spec.requirements),
         settings.seed,
@@ -190,6 +194,8 @@ def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
     used: set[tuple[bytes, int, bool]] = set()
     for number in range(1, settings.generations + 1):
         designs = low + evolution.ask() * (high - low)
+        if number == 1:
+            designs = np.vstack([designs, first[settings.population :]])
         jobs = [(point, -1, True) for point in designs.tolist()]
         if front is not None:
             jobs += _designs_to_improve(front, tables, number, used)
@@ -263,7 +269,6 @@ def _designs_to_improve(
     candidates += [(point, (number + k) % objectives, True) for k, point in enumerate(points)]
     jobs = []
     for point, objective, hold in candidates:
-        hold = hold and objectives > 1
         if (key := (point.tobytes(), objective, hold)) not in used:
             used.add(key)
             jobs.append((point.tolist(), objective, hold))
