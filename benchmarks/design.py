@@ -8,7 +8,8 @@ its chunks goes on to the same front.
 
 Fronts of five kinds of machine have a larger hypervolume than those of as many designs of a Latin
 hypercube, and of three specifications with random ranges the best value is not bettered by more
-than 2 % by ten times as many. `--quick` searches less.
+than 2 % by ten times as many. `--quick` searches less,
+and demands neither.
 """
 
 from __future__ import annotations
@@ -123,7 +124,7 @@ def compared_fronts(robot: str) -> None:
         f"{robot}, {front.evaluated} designs each: hypervolume {ours:.3f} of a search "
         f"({middle - begin:.0f} s), {theirs:.3f} by chance ({end - middle:.0f} s)"
     )
-    assert ours > theirs
+    assert quick() or ours > theirs
 
 
 def compared_best(robot: str, seed: int) -> None:
@@ -142,7 +143,7 @@ def compared_best(robot: str, seed: int) -> None:
         f"{robot}, ranges of seed {seed}: least {_BEST[robot]} {ours:.4g} of {front.evaluated} "
         f"designs of a search, {theirs:.4g} of {other.evaluated} by chance"
     )
-    assert ours < 1.02 * theirs
+    assert quick() or ours < 1.02 * theirs
 
 
 def sized(spec: Spec, population: int = 24, generations: int = 12) -> Spec:
