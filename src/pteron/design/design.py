@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pteron.design.placement import best_place
 from pteron.design.quantities import COVERS
 from pteron.design.regions import placed_pose, workspace_poses, workspace_region
 from pteron.design.spec import ROUNDING
@@ -26,6 +28,7 @@ from pteron.result import Result
 from pteron.workspace import Box, Region
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
 from pteron.workspace.shape_samples import cube, shape_samples
+from pteron.workspace.tilts import OrientedRegion
 
 _STARTS = 8
 """Number of worst sample poses that local refinement starts from."""
@@ -51,6 +54,8 @@ class Design(Result):
         Its largest cube, or the place of its workspace, where that is proved.
     least : float
         The least row of the conditions over the required workspace that a proof has shown.
+    refined : bool
+        Whether worst values are sought about the worst sampled poses too; else at these alone.
     """
 
     SHOWN = "robot quantities"
@@ -59,6 +64,7 @@ class Design(Result):
     robot: Manipulator
     known: Fit | None = None
     least: float = np.inf
+    refined: bool = True
 
     def __repr__(self) -> str:
         """Return the names of the task's machine and of the design in one line."""
@@ -84,16 +90,42 @@ class Design(Result):
 
     @cached_property
     def cube(self) -> Fit:
-        """The largest cube (or floating workspace) of feasible poses, by search or proof."""
+        """The largest cube of feasible poses, or the place of a workspace that floats.
+
+        Found by search, or proved.
+        """
         if self.known is not None:
             return self.known
+        return self.placed_without(np.empty((0, self.robot.freedom)), thorough=False)
+
+    @property
+    def placed_anywhere(self) -> Design:
+        """The design with a workspace that floats placed thoroughly; itself without."""
+        if not self.task.place_quantities:
+            return self
+        none = np.empty((0, self.robot.freedom))
+        return replace(self, known=self.placed_without(none, thorough=True))
+
+    def placed_without(self, failing: Array, *, thorough: bool) -> Fit:
+        """Return the largest cube, or the best place, that excludes infeasible poses (F, m)."""
+        fit = self.cube_without(failing) if len(failing) else self._largest_cube
+        if not self.task.place_quantities or fit.edge < self.task.shape[1]:
+            return fit
+        return best_place(self, fit, failing, thorough=thorough)
+
+    @cached_property
+    def _largest_cube(self) -> Fit:
+        """The largest cube, or floating workspace, of feasible poses, by search."""
         return self.cube_without(np.empty((0, self.robot.freedom)))
 
     def cube_without(self, failing: Array) -> Fit:
         """Return the largest cube of feasible poses that excludes the infeasible poses (F, m)."""
-        task, ball = self.task, search_ball(self.robot)
-        shape, _ = task.shape
-        return largest_fit(task.conditions, self.geometry, task.orientations, ball, failing, shape)
+        task, (shape, _) = self.task, self.task.shape
+        angles, poses = self.robot.platform.angular, task.orientations
+        sampled = (failing[:, None, angles] == poses[:, angles]).all(axis=-1).any(axis=-1)
+        poses = np.vstack([poses, failing[~sampled]])
+        ball = search_ball(self.robot)
+        return largest_fit(task.conditions, self.geometry, poses, ball, failing, shape)
 
     @cached_property
     def workspace(self) -> WorkspaceTable | None:
@@ -145,9 +177,9 @@ class Design(Result):
         return worst_speeds(self.robot, poses, self.task.spec.motion.speed)
 
     def region(self, pose: Array) -> Region:
-        """Return the region of the workspace, or of the cube, at the orientation of a pose (m,)."""
+        """Return the workspace, or the cube, as a region at a pose's orientation, or at all."""
         if self.workspace is not None:
-            return workspace_region(self.workspace, pose)
+            return self.task.oriented_region(workspace_region(self.workspace, pose))
         half = 0.5 * self.cube.edge
         return Box(*(placed_pose(pose, self.cube.center + side * half) for side in (-1.0, 1.0)))
 
@@ -163,18 +195,18 @@ class Design(Result):
         signed = sign * of(self, poses)
         if np.isnan(signed).any():
             return np.nan
-        lengths = len(self.robot.platform.lengths)
-        offsets = np.zeros((3**lengths, self.robot.freedom))
-        offsets[:, :lengths] = list(product((-1.0, 0.0, 1.0), repeat=lengths))
         starts = np.argsort(signed, kind="stable")[-_STARTS:]
         worst, most = poses[starts], signed[starts]
         regions = [self.region(pose) for pose in worst]
         low, high = np.stack([region.box for region in regions], axis=1)
+        offsets = _neighbours((high > low).any(axis=0), self.robot.platform.angular)
         step = (high - low) / self._samples
-        for _ in range(_ROUNDS):
+        for _ in range(_ROUNDS if self.refined else 0):
             step = step / 2.0
             around = np.clip(worst[:, None] + step[:, None] * offsets, low[:, None], high[:, None])
             for region, pose, neighbours in zip(regions, worst, around, strict=True):
+                if isinstance(region, OrientedRegion):
+                    region.onto_cone(neighbours)
                 neighbours[~region.holds(neighbours)] = pose
             nearby = sign * of(self, around.reshape(-1, self.robot.freedom))
             nearby = np.nan_to_num(nearby, nan=-np.inf).reshape(len(worst), -1)
@@ -188,7 +220,7 @@ class Design(Result):
     @cached_property
     def cycles(self) -> tuple[Motion, ...]:
         """The motions of the task's cycles, placed about the middle of the workspace."""
-        spec, middle = self.task.spec, self.task.orientations[0].copy()
+        spec, middle = self.task.spec, self.task.stated_poses[0].copy()
         lengths = len(self.robot.platform.lengths)
         ends = None if self.workspace is None else np.array(self.workspace.ends)
         if ends is not None:
@@ -205,7 +237,7 @@ class Design(Result):
 
         A cycle that may be done anywhere is evaluated at all its places and turns in the workspace.
         """
-        cycles, pose = self.task.spec.cycles, self.task.orientations[0]
+        cycles, pose = self.task.spec.cycles, self.task.stated_poses[0]
         anywhere = self.workspace is not None and any(cycle.anywhere for cycle in cycles)
         return size(
             self.loaded_robot,
@@ -335,6 +367,16 @@ class Design(Result):
         widths = np.ptp(joint_limits(self.task.robot), axis=0)
         endless = np.isinf(widths)
         return np.where(endless, _start(self.task).strokes, widths) if endless.any() else widths
+
+
+def _neighbours(varies: NDArray[np.bool_], angular: NDArray[np.bool_]) -> Array:
+    """Return steps (S, m), each -1, 0 or 1, to neighbours in places or in angles, not in both."""
+    steps = np.zeros((0, len(varies)))
+    for free in (varies & ~angular, varies & angular):
+        part = np.zeros((3 ** int(free.sum()), len(varies)))
+        part[:, free] = list(product((-1.0, 0.0, 1.0), repeat=int(free.sum())))
+        steps = np.vstack([steps, part])
+    return steps
 
 
 @lru_cache(maxsize=8)

@@ -72,14 +72,24 @@ class Change(Result):
         if math.isnan(number):
             return "none"
         if self.unit == "m":
-            return f"{1000.0 * number:{'.1f' if abs(number) >= _SMALL else '.3g'}} mm"
+            return f"{1000.0 * number + 0.0:{'.1f' if abs(number) >= _SMALL else '.3g'}} mm"
         return f"{number:.4g} {self.unit}".rstrip()
 
 
 def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
-    """Return changes of geometric numbers from the task's machine to `robot`, equal legs joined."""
+    """Return changes of geometric numbers from the task's machine to `robot`, equal legs joined.
+
+    A factor of numbers with more than two sizes, as of a platform's points, is one change.
+    """
     legs_by_change: dict[tuple[str, float, float, str], list[int]] = {}
+    factors: list[Change] = []
     for variable in task.variables:
+        sizes = {round(abs(place.read(task.robot)), 9): place for place in variable.places}
+        if variable.by == "factor" and len(sizes) > 2:
+            largest = sizes[max(sizes)]
+            factor = largest.read(robot) / largest.read(task.robot)
+            factors.append(Change(f"factor of {variable.name}", 1.0, factor, ""))
+            continue
         for place in variable.places:
             drawn, designed = place.read(task.robot), place.read(robot)
             if abs(designed - drawn) > ROUNDING:
@@ -88,7 +98,7 @@ def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
                 unit = "m" if place.role in ("length", "point") else ""
                 key = what, round(drawn, 9), round(designed, 9), unit
                 legs_by_change.setdefault(key, []).append(place.leg)
-    return [
+    return factors + [
         Change(f"{what} of {legs_text(legs)}", drawn, designed, unit)
         for (what, drawn, designed, unit), legs in legs_by_change.items()
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,46 @@ from pteron.kernels import Array
 def _pymoo(module: str) -> Any:
     """Import `pymoo.<module>`; raise with the name of the extra to install where it is missing."""
     return import_extra("design", f"pymoo.{module}", "a search needs pymoo")
+
+
+EQUAL = 1e-3
+"""Share of a value by which two values of an objective may differ and count as equal. Chosen:
+tables show four digits, and no builder holds an index or all of a machine's lengths to 0.1 %."""
+
+
+def count_tolerances(costs: Array) -> Array:
+    """Return costs (N, M) as multiples of `EQUAL`, so that equal values differ by at most 1.
+
+    They are logarithms; values below a thousandth of the objective's largest are taken linearly.
+    """
+    floor = EQUAL * np.abs(costs).max(axis=0)
+    return np.asarray(np.arcsinh(costs / np.where(floor > 0.0, floor, 1.0)) / EQUAL)
+
+
+def distinct_front(costs: Array) -> NDArray[np.int_]:
+    """Return the indices of the Pareto-optimal rows of costs (N, M) that differ, sorted by costs.
+
+    A row is left out if another one is worse by more than the tolerance `EQUAL` in no cost, and in
+    all costs together loses no more than it gains.
+    """
+    front = pareto_front(costs)
+    counts = count_tolerances(costs[front])
+    chosen: list[int] = []
+    for k in np.argsort(counts.sum(axis=1), kind="stable").tolist():
+        if not (counts[chosen] <= counts[k] + 1.0).all(axis=1).any():
+            chosen.append(k)
+    return np.asarray(front[np.sort(chosen)])
+
+
+def lexicographic_best(costs: Array, order: Sequence[int]) -> int:
+    """Return the index of the row of costs (N, M) that is least in the first cost of an order.
+
+    Of rows that are equal in it, up to the tolerance `EQUAL`, the next cost decides.
+    """
+    counts, rows = count_tolerances(costs), np.arange(len(costs))
+    for k in order:
+        rows = rows[counts[rows, k] <= counts[rows, k].min() + 1.0]
+    return int(rows[0])
 
 
 def pareto_front(costs: Array) -> NDArray[np.int_]:

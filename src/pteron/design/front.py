@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.evolution import pareto_front
+from pteron.design.evolution import distinct_front, lexicographic_best, pareto_front
 from pteron.design.proofs import counterexamples
-from pteron.design.rows import FAILED, MISSES, places, violations
+from pteron.design.rows import MISSES, places, violations
+from pteron.design.spec import FAILED
 from pteron.design.task import Task
 from pteron.errors import ModelError
 from pteron.html_table import Overview, frame_overview
@@ -60,7 +61,7 @@ class Front(Result):
         """Return the counts of evaluated, feasible and Pareto-optimal designs in a line of text."""
         return (
             f"{self.task.robot.name}: {self.evaluated} designs evaluated, {self.kept} meet all "
-            f"requirements, {len(self)} Pareto-optimal (no other is better in every objective)"
+            f"requirements, {len(self)} on the Pareto front (less than 0.1 % apart is equal)"
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -107,12 +108,15 @@ class Front(Result):
     def selection(self) -> dict[str, int]:
         """Row indices of the designs in a report: best in each objective, and the compromise.
 
-        The compromise is the design nearest to the best value of all objectives at once, each
+        Where several are equally good in an objective, the others decide, in their order. The
+        compromise is the design nearest to the best value of all objectives at once, each
         objective scaled by its range over the front; with one objective there is none.
         """
         costs, objectives = self.task.costs(self.designs), self.task.spec.objectives
-        best = zip(objectives, costs.argmin(axis=0).tolist(), strict=True)
-        best_designs = {f"best-{objective.quantity}": at for objective, at in best}
+        best_designs = {}
+        for k, objective in enumerate(objectives):
+            order = [k, *(j for j in range(len(objectives)) if j != k)]
+            best_designs[f"best-{objective.quantity}"] = lexicographic_best(costs, order)
         spans = np.ptp(costs, axis=0)
         shares = (costs - costs.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
         if len(objectives) > 1:
@@ -193,7 +197,7 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
     if best is None:
         assert nearest is not None  # there is at least one design
         raise _impossible(task, nearest, evaluated)
-    return Front(task, best, evaluated, feasible)
+    return Front(task, best[distinct_front(task.costs(best))], evaluated, feasible)
 
 
 def _misses_of(task: Task, designs: pl.DataFrame) -> Array:

@@ -7,16 +7,22 @@ which is sought anew until it is proved.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from itertools import chain
 
 import numpy as np
 
 from pteron.design.design import Design
 from pteron.design.kind_evaluator import KindEvaluator
 from pteron.design.rating import Rating
-from pteron.design.regions import kind_regions, placed_pose, workspace_region
+from pteron.design.regions import (
+    kind_regions,
+    placed_pose,
+    sampled_orientations,
+    workspace_region,
+)
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.kernels import Array, sharing_programs
@@ -25,6 +31,7 @@ from pteron.result import Result
 from pteron.workspace import Box, Proof, Region, interference, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.shape_samples import Samples, fixed_samples
+from pteron.workspace.tilts import OrientedRegion
 
 _SHARES = (0.9999, 0.999, 0.995, 0.98, 0.95, 0.9, 0.75, 0.5, 0.25, 0.1)
 """Shares of the cube's edge that are tried in turn: at the whole edge some condition is zero, which
@@ -33,8 +40,9 @@ cannot be decided."""
 _PLACED = (1.0, 0.9999)
 """Shares of a workspace that floats, at the place that is found for it."""
 
-_MOST = 200_000
-"""Greatest number of boxes of a proof."""
+_MOST, _MOST_ORIENTED = 200_000, 20_000
+"""Greatest number of boxes of a proof at one orientation, and over ranges of orientations: beyond
+the second, which takes a few seconds, single orientations are proved."""
 
 _BOXES, _BOXES_CLEAR = 60_000, 1_000
 """Boxes after which a proof of reach is given up, and a proof that no two bodies touch, whose
@@ -150,6 +158,8 @@ def proved_cube(design: Design) -> ProvedCube | None:
         If the size is capped, the edge is `least` at most.
         """
         fit = design.cube_without(failing) if len(failing) else design.cube
+        if placed:
+            fit = design.placed_without(failing, thorough=True)
         if not capped:
             return fit
         fits = fit.edge >= least * (1.0 - ROUNDING)
@@ -160,7 +170,11 @@ def proved_cube(design: Design) -> ProvedCube | None:
         return cube_proofs(design, fit.center, fit.edge)
 
     shares = _PLACED if capped else _SHARES
+    placed = bool(task.place_quantities)
     fitted = proved_fit(search, proofs, shape, shares, design.robot.freedom)
+    if fitted is None and placed:
+        placed = False
+        fitted = proved_fit(search, proofs, shape, shares, design.robot.freedom)
     if fitted is None:
         return None
     fit, proved = fitted
@@ -173,16 +187,18 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
     If the workspace floats, the proofs are for the workspace at this centre, with `edge` its
     greatest side.
     """
-    proofs = []
-    floating = design.task.spec.workspace if design.task.floats else None
-    for pose in design.task.orientations:
-        if floating is None:
-            ends = (placed_pose(pose, center + side * edge) for side in (-0.5, 0.5))
-            region: Region = Box(*ends)
-        else:
-            share = edge / design.task.shape[1]
-            region = workspace_region(floating.with_center(center), pose, share)
-        proofs.append(_proof(design, region))
+    task = design.task
+    share = edge / task.shape[1] if task.floats else 1.0
+
+    def places(pose: Array, _: float) -> Region:
+        """Return the cube, or the workspace that floats, at the orientation of a pose (m,)."""
+        if not task.floats or task.spec.workspace is None:
+            return Box(*(placed_pose(pose, center + side * edge) for side in (-0.5, 0.5)))
+        return workspace_region(task.spec.workspace.with_center(center), pose, share)
+
+    proofs: list[Proof] = []
+    for pose in task.stated_poses:
+        proofs += _range_proofs(design, places, pose, (min(share, 1.0),))
         if not proofs[-1].holds:
             break
     return tuple(proofs)
@@ -194,18 +210,41 @@ def workspace_proofs(design: Design) -> tuple[Proof, ...]:
     A workspace that touches the boundary of the feasible poses is undecided; the proof is then for
     0.9999 of it, about its middle, if that can be proved. `workspace_share` returns this share.
     """
-    proofs: list[Proof] = []
     required = design.workspace
     if required is None:
         return ()
-    for pose in design.task.orientations:
-        full_proof = _proof(design, workspace_region(required, pose))
-        smaller = (
-            None if full_proof.holds is not None else workspace_region(required, pose, _SHARES[0])
-        )
-        nearly = full_proof if smaller is None else _proof(design, smaller)
-        proofs.append(nearly if nearly.holds else full_proof)
-    return tuple(proofs)
+    places = partial(workspace_region, required)
+    poses = design.task.stated_poses
+    return tuple(chain(*(_range_proofs(design, places, pose, _PLACED) for pose in poses)))
+
+
+def _range_proofs(
+    design: Design,
+    places: Callable[[Array, float], Region],
+    pose: Array,
+    shares: Sequence[float],
+) -> list[Proof]:
+    """Return the proof for places at a stated pose (m,) and at all orientations about it.
+
+    `places` takes a pose and a share; shares are tried in turn while a proof is undecided. If it is
+    at all of them, the proofs are for places at each sampled orientation, up to the first failure.
+    """
+    task = design.task
+    samples = sampled_orientations(task.spec.workspace, task.robot.platform, pose[None])
+    first: list[Proof] = []
+    for attempts in (pose[None], samples) if task.has_ranges else (pose[None],):
+        for share in shares:
+            proofs: list[Proof] = []
+            for at in attempts:
+                region = places(at, share)
+                region = task.oriented_region(region, share) if attempts is not samples else region
+                proofs.append(_proof(design, region))
+                if not proofs[-1].holds:
+                    break
+            first = first or proofs
+            if proofs[-1].holds is not None:
+                return proofs
+    return first
 
 
 def counterexamples(design: Design, center: Array, edge: float) -> Samples:
@@ -230,15 +269,23 @@ def workspace_share(design: Design, proof: Proof) -> float:
     if design.task.floats:
         sides = np.ptp(proof.region.box, axis=0)[: len(design.cube.center)]
         return min(1.0, round(float(sides.max()) / design.task.shape[1], 6))
-    full_regions = (workspace_region(required, pose) for pose in design.task.orientations)
-    return 1.0 if proof.region in full_regions else _SHARES[0]
+    size = np.ptp(proof.region.box, axis=0)
+    full_size = np.ptp(design.region(design.task.stated_poses[0]).box, axis=0)
+    varies = (size > 0.0) & (full_size > 0.0)
+    return min(1.0, round(float((size[varies] / full_size[varies]).max(initial=0.0)), 6)) or 1.0
+
+
+def is_sampled(task: Task, proofs: Sequence[Proof]) -> bool:
+    """Return whether proofs hold at sampled orientations of the workspace's ranges alone."""
+    return task.has_ranges and not all(isinstance(p.region, OrientedRegion) for p in proofs)
 
 
 def _proof(design: Design, region: Region) -> Proof:
     """Return the proof attempt that a design is feasible in a region, with shared programs."""
     floors = design.task.floors
+    most = _MOST_ORIENTED if isinstance(region, OrientedRegion) else _MOST
     with sharing_programs(design.task.robot):
-        return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
+        return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=most)
 
 
 def _least(design: Design, proof: Proof) -> float:

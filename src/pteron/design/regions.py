@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,14 @@ from pteron.manipulator import Manipulator
 from pteron.motion.trajectories.tool import arm_motion, carries, tool_motion
 from pteron.platforms import Platform
 from pteron.workspace import Box, Cylinder, Region
-from pteron.workspace.shape_samples import Shape
+from pteron.workspace.shape_samples import Shape, shape_samples
+from pteron.workspace.tilts import OrientedRegion, tilt_angles
 
 _RING = 24
 """Points round a cylinder's rim."""
+
+_TILTS, _TURNS = 6, 3
+"""Sampled directions of the greatest tilt, beside the level one, and angles of a range."""
 
 
 def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float]:
@@ -45,41 +48,17 @@ def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float
     return Shape(half, gauge, rim.reshape(-1, 3)), edge
 
 
-def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | None = None) -> Array:
-    """Return poses (N, m) over a workspace at orientations (A, m); with 2 samples its corners."""
-    positions = _positions(workspace, samples or workspace.samples)
-    poses = np.repeat(angles, len(positions), axis=0)
-    poses[:, : positions.shape[1]] = np.tile(positions, (len(angles), 1))
-    return poses
-
-
-def _positions(workspace: WorkspaceTable, count: int) -> Array:
-    """Return a grid of positions (N, k) over a workspace, its boundary included, m."""
-    line = np.linspace(-1.0, 1.0, count)
-    if workspace.shape != "cylinder":
-        low, high = (np.array(end) for end in workspace.ends)
-        units = np.array(list(product(line, repeat=len(low))))
-        return np.asarray((low + high) / 2.0 + units * (high - low) / 2.0)
-    assert workspace.radius is not None  # the shape says so
-    assert workspace.height is not None
-    axis = "xyz".index(workspace.axis)
-    turns = np.linspace(0.0, 2.0 * np.pi, 4 * count, endpoint=False)
-    radii = np.linspace(0.0, workspace.radius, max(2, (count + 1) // 2))
-    points = [
-        (r * np.cos(a), r * np.sin(a), h * workspace.height / 2.0)
-        for h in line
-        for r in radii
-        for a in (turns if r else turns[:1])
-    ]
-    # The last is along the axis.
-    order = [(axis + 1) % 3, (axis + 2) % 3, axis]
-    positions = np.empty((len(points), 3))
-    positions[:, order] = points
-    return np.asarray(positions + np.array(workspace.center))
+def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int) -> Array:
+    """Return poses (N, m) over a workspace at orientations (A, m); of a box 2 give its corners."""
+    center = np.mean(workspace.ends, axis=0)
+    if not len(center):
+        return angles
+    shape, edge = workspace_shape(workspace, len(center))
+    return shape_samples(shape, angles, samples).shape_poses(center, edge)
 
 
 def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
-    """Return a workspace, scaled by `share`, as a region at a pose's orientation."""
+    """Return the places of a workspace, scaled by `share`, at a pose's orientation."""
     if table.shape == "cylinder":
         assert table.radius is not None  # the shape says so
         assert table.height is not None
@@ -89,6 +68,39 @@ def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> 
     low, high = (np.array(end) for end in table.ends)
     inset = 0.5 * (1.0 - share) * (high - low)
     return Box(placed_pose(pose, low + inset), placed_pose(pose, high - inset))
+
+
+def oriented_region(
+    places: Region, workspace: WorkspaceTable | None, platform: Platform, share: float = 1.0
+) -> Region:
+    """Return a region of places at all orientations of a workspace, their ranges scaled."""
+    if workspace is None or not workspace.has_ranges:
+        return places
+    low, high = places.box[:, platform.angular]
+    if workspace.tilt is not None:
+        low[:2], high[:2] = -share * workspace.tilt, share * workspace.tilt
+    for name, (first, last) in (workspace.angles or {}).items():
+        at, inset = platform.angles.index(name), 0.5 * (1.0 - share) * (last - first)
+        low[at], high[at] = first + inset, last - inset
+    tilt = None if workspace.tilt is None else share * workspace.tilt
+    return OrientedRegion(places, tuple(low.tolist()), tuple(high.tolist()), tilt)
+
+
+def sampled_orientations(
+    workspace: WorkspaceTable | None, platform: Platform, poses: Array
+) -> Array:
+    """Return poses (A, m) at sampled tilts and angles of a workspace, about each pose (B, m)."""
+    if workspace is not None and workspace.tilt is not None:
+        rim = 2.0 * np.pi * np.arange(_TILTS) / _TILTS
+        leans = np.vstack([[0.0, 0.0], tilt_angles(workspace.tilt, rim)])
+        poses = np.repeat(poses[:, None], 1 + _TILTS, axis=1)
+        poses[..., np.flatnonzero(platform.angular)[:2]] = leans
+        poses = poses.reshape(-1, poses.shape[-1])
+    for name, ends in ((workspace and workspace.angles) or {}).items():
+        poses = np.repeat(poses[:, None], _TURNS, axis=1)
+        poses[..., platform.coordinates.index(name)] = np.linspace(*ends, _TURNS)
+        poses = poses.reshape(-1, poses.shape[-1])
+    return poses
 
 
 def placed_pose(pose: Array, position: Array) -> tuple[float, ...]:

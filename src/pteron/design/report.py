@@ -16,7 +16,7 @@ from pteron.design.differences import (
     stroke_words,
 )
 from pteron.design.front import Front
-from pteron.design.proofs import Proved, place_words, prove_design, workspace_share
+from pteron.design.proofs import Proved, is_sampled, place_words, prove_design, workspace_share
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
@@ -59,10 +59,14 @@ class ReportedDesign(Proved):
             lines.append("cube: not proved" if self.cube is None else f"cube {self.cube.words}")
         if task.floats:
             lines.append(self._place)
-        for proof in self.workspace:
+        sampled = is_sampled(task, self.workspace)
+        for proof in self.workspace[-1:] if sampled else self.workspace:
             share = workspace_share(self.design, proof)
             part = "" if share == 1.0 else f", {100.0 * share:g} % of it,"
-            lines.append(f"workspace{part} {proof}")
+            ranges = "" if task.spec.workspace is None else task.spec.workspace.range_words
+            if sampled:
+                ranges = f", at {len(self.workspace)} sampled orientations of its ranges alone"
+            lines.append(f"workspace{part.rstrip(',')}{ranges}{',' * bool(part or ranges)} {proof}")
         return lines
 
     @property
@@ -115,19 +119,23 @@ class ReportedDesign(Proved):
     def as_dict(self) -> dict[str, Any]:
         """Return the machine, its quantities and its proofs as plain data, SI units."""
         design, names = self.design, self.design.task.quantity_names
-        center = {"workspace_center": design.cube.center.tolist() if self.workspace else None}
+        center = design.cube.center.tolist() if design.task.floats and self.workspace else None
         changes = [] if self.name == "start" else [vars(change) for change in self.changes]
         contents = {
             "machine": machine_record(design.robot),
             **{name: design.quantity(name) for name in names},
             "known": {name: self._reasons[name] or design.cover(name) for name in names},
-            **(center if design.task.floats else {}),
+            **({"workspace_center": center} if design.task.floats else {}),
             "changes": changes,
         }
         if self.cube is not None:
             boxes = sum(proof.boxes for proof in self.cube.proofs)
             cube = {"center": self.cube.center.tolist(), "edge": self.cube.edge, "boxes": boxes}
             contents["proved_cube"] = cube
+        if design.task.has_ranges:
+            contents["orientations_proved"] = (
+                "sampled" if is_sampled(design.task, self.workspace) else "all"
+            )
         contents["workspace_proved"] = [proof.holds for proof in self.workspace]
         contents["workspace_share"] = [workspace_share(design, proof) for proof in self.workspace]
         return contents
@@ -213,7 +221,7 @@ class FrontReport(Result):
             f"# Designs of {front.task.robot.name}",
             "",
             f"{front.evaluated} designs were evaluated; {front.kept} meet all requirements; "
-            f"Pareto-optimal, that is bettered by no other in every objective: {len(front)}. A "
+            f"on the Pareto front, where values less than 0.1 % apart are equal: {len(front)}. A "
             "link of another "
             + (
                 "length is drawn out along itself: its mass grows with the length."

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pteron.design.design import Design
 from pteron.design.proofs import prove_design
-from pteron.design.spec import ROUNDING
+from pteron.design.spec import FAILED, ROUNDING
 from pteron.design.task import Task
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 MISSES = "misses "
 """Prefix of the columns with violations."""
 
-FAILED = 1e6
-"""Violation of a design that is no possible machine, or lacks a quantity."""
-
 
 def evaluate_design(
-    task: Task, point: Sequence[float], *, proofs: bool = False
+    task: Task, point: Sequence[float], *, proofs: bool = False, thorough: bool = False
 ) -> dict[str, float]:
     """Return quantities and violations of a design (V,), by column name.
 
     "misses workspace" is by how much the least condition is below 0, and "misses 1 links" the
     relative violation of the first requirement, on `links`; both are 0 if satisfied. With `proofs`
-    the cube is the proved one, and a workspace that is not proved counts as violated.
+    the cube is the proved one, and a workspace that is not proved counts as violated. A workspace
+    that floats is placed near where it could be largest or, if `thorough`, anywhere.
     """
     try:
         design = Design(task, task.machine(point))
+        if thorough:
+            design = design.placed_anywhere
         if proofs:
             design = prove_design(design).design
         row = {name: design.quantity(name) for name in task.quantity_names}
@@ -60,13 +60,16 @@ def places(task: Task) -> list[str]:
     return [f"center {name}" for name in task.robot.platform.lengths] if task.floats else []
 
 
-def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.DataFrame:
+def design_table(
+    task: Task, designs: ArrayLike, *, proofs: bool = False, thorough: bool = False
+) -> pl.DataFrame:
     """Return a table of designs (N, V), a row each: variables, quantities and violations."""
     import polars as pl
 
     points = np.asarray(designs)
     with one_thread():
-        rows = [evaluate_design(task, row, proofs=proofs) for row in points.tolist()]
+        depth = {"proofs": proofs, "thorough": thorough}
+        rows = [evaluate_design(task, row, **depth) for row in points.tolist()]
     columns = {v.name: points[:, k].tolist() for k, v in enumerate(task.variables)}
     return pl.DataFrame(columns | {name: [row[name] for row in rows] for name in rows[0]})
 

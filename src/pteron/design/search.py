@@ -15,15 +15,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from pteron.design.evolution import Evolution, latin_hypercube
+from pteron.design.evolution import Evolution, count_tolerances, latin_hypercube
 from pteron.design.front import Front, ProvedRows
 from pteron.design.improvement import improve_design
-from pteron.design.rows import FAILED, design_table, violations
-from pteron.design.spec import SearchTable, Spec
+from pteron.design.rows import design_table, violations
+from pteron.design.spec import FAILED, SearchTable, Spec
 from pteron.design.task import Task
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
@@ -36,8 +36,14 @@ from pteron.shapes import Workers
 if TYPE_CHECKING:
     import polars as pl
 
+_FIRST = 3
+"""Size of the first generation, as a multiple of the others': it finds where designs are good."""
+
 _CHUNK = 4
 """Designs that one worker takes at a time."""
+
+Job: TypeAlias = tuple[list[float], int, bool]
+"""A design, the objective to improve or -1, and whether the other objectives are held."""
 
 
 def search(
@@ -51,9 +57,9 @@ def search(
 ) -> Front:
     """Search for the Pareto-optimal designs of a machine and return their front.
 
-    The first generation is a Latin hypercube that includes the initial machine; NSGA-II makes the
-    others, and the best designs of each are improved by gradients. The same spec and seed give the
-    same front, on any computer, also after interruptions.
+    The first generation, of three times the population, is a Latin hypercube that includes the
+    initial machine; NSGA-II makes the others, and the best designs of each are improved. The same
+    spec and seed give the same front, on any computer, also after interruptions.
 
     Parameters
     ----------
@@ -175,8 +181,9 @@ def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
     """Run the generations of a search; return the front of all designs, each of it proved."""
     task = evaluation.task
     settings, (low, high) = task.spec.search, task.ranges
+    first = first_designs(task, _FIRST * settings.population, settings.seed)
     evolution = Evolution(
-        (first_designs(task, settings.population, settings.seed) - low) / (high - low),
+        (first[: settings.population] - low) / (high - low),
         len(task.spec.objectives),
         1 + len(task.spec.requirements),
         settings.seed,
@@ -184,12 +191,14 @@ def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
     tables: list[pl.DataFrame] = []
     proofs = ProvedRows(task, evaluation.prove)
     front: Front | None = None
-    used: set[tuple[bytes, int]] = set()
+    used: set[tuple[bytes, int, bool]] = set()
     for number in range(1, settings.generations + 1):
         designs = low + evolution.ask() * (high - low)
-        jobs = [(point, -1) for point in designs.tolist()]
+        if number == 1:
+            designs = np.vstack([designs, first[settings.population :]])
+        jobs = [(point, -1, True) for point in designs.tolist()]
         if front is not None:
-            jobs += _designs_to_improve(front, number, used)
+            jobs += _designs_to_improve(front, tables, number, used)
         plan = {"generation": number, "designs": _digest(designs)}
         report = None if progress is None else partial(_report, progress, number, settings)
         tables.append(evaluation.rows(evaluate_designs, jobs, f"{number:04d}", plan, report))
@@ -217,11 +226,16 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
     return designs
 
 
-def evaluate_designs(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
-    """Return rows of (point, objective) jobs; unless objective < 0, improved in it by gradients."""
+def evaluate_designs(task: Task, jobs: Sequence[Job]) -> pl.DataFrame:
+    """Return rows of (point, objective, hold) jobs, improved in their objective unless it is -1."""
+    import polars as pl
+
+    plain = [point for point, k, _ in jobs if k < 0]
     with one_thread():
-        designs = [point if k < 0 else improve_design(task, point, k) for point, k in jobs]
-    return design_table(task, designs)
+        better = [improve_design(task, p, k, hold=hold) for p, k, hold in jobs if k >= 0]
+    parts = [design_table(task, part, thorough=part is better) for part in (plain, better) if part]
+    rows: pl.DataFrame = pl.concat(parts)
+    return rows
 
 
 def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
@@ -230,21 +244,34 @@ def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
 
 
 def _designs_to_improve(
-    front: Front, number: int, used: set[tuple[bytes, int]]
-) -> list[tuple[list[float], int]]:
-    """Return (design, objective) pairs to improve, spread over the front; each is new in `used`."""
+    front: Front, tables: Sequence[pl.DataFrame], number: int, used: set[tuple[bytes, int, bool]]
+) -> list[Job]:
+    """Return improvements of designs: of the best in each objective, and spread over the front.
+
+    Each is new in `used`. The best in an objective is improved in it at the cost of the others. A
+    front of few designs, as with one objective, is joined by the next best feasible designs.
+    """
     spec = front.task.spec
     settings, objectives = spec.search, len(spec.objectives)
     count = settings.refined
     if number == settings.generations and count:
         count = settings.population  # the last word on the whole front
+    spread = np.unique(np.linspace(0, len(front) - 1, count).round().astype(int))
+    best = list(front.selection.values())[:objectives] if count else []
+    candidates = [(front.values[at], k, False) for k, at in enumerate(best)]
+    points = list(front.values[spread])
+    if len(spread) < count:
+        feasible = [table.filter(violations(table).sum(axis=1) == 0.0) for table in tables]
+        costs = np.vstack([front.task.costs(table) for table in feasible])
+        others = np.vstack([front.task.points(table) for table in feasible])
+        sums = np.nan_to_num(count_tolerances(np.nan_to_num(costs, nan=FAILED)).sum(axis=1))
+        points += list(others[np.argsort(sums, kind="stable")][: count - len(spread)])
+    candidates += [(point, (number + k) % objectives, True) for k, point in enumerate(points)]
     jobs = []
-    spread = np.linspace(0, len(front) - 1, count).round().astype(int)
-    for k, at in enumerate(np.unique(spread)):
-        candidate = front.values[at], (number + k) % objectives
-        if (key := (candidate[0].tobytes(), candidate[1])) not in used:
+    for point, objective, hold in candidates:
+        if (key := (point.tobytes(), objective, hold)) not in used:
             used.add(key)
-            jobs.append((candidate[0].tolist(), candidate[1]))
+            jobs.append((point.tolist(), objective, hold))
     return jobs
 
 

@@ -36,6 +36,9 @@ _ABSENT = "no such file; it should describe a search for a design"
 ROUNDING = 1e-9
 """Relative tolerance of bounds."""
 
+FAILED = 1e6
+"""Violation of a design that is no possible machine, or lacks a quantity."""
+
 
 def _expect_rising(pair: tuple[float, float]) -> tuple[float, float]:
     """Return the pair [low, high]; raise unless low is below high."""
@@ -284,6 +287,7 @@ class Spec(TomlTable):
             for part in self.objectives
         ]
         lines += [part.words for part in self.requirements]
+        lines += [] if self.workspace is None else [self.workspace.words]
         lines += [
             f"{name} at least {floor:.12g} everywhere"
             for name, floor in self.floors

@@ -8,11 +8,13 @@ import numpy as np
 
 from pteron.design.regions import workspace_poses
 from pteron.design.spec import Spec
+from pteron.design.workspace_tables import WorkspaceTable
 from pteron.errors import PteronError
 from pteron.indices import INDICES
 from pteron.kinematics.unlikely_values import unlikely_values
 from pteron.manipulator import Manipulator
 from pteron.motion import limits_of
+from pteron.workspace.tilts import has_level_axes
 
 
 def spec_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
@@ -20,13 +22,19 @@ def spec_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
     if spec.pose is not None and len(spec.pose) != robot.freedom:
         yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
     if spec.angles is not None and robot.platform.axis_angle is None:
-        turns = "tilts: give its orientation in pose" if robot.platform.angles else "does not turn"
+        turns = "tilts: give its orientation in pose, or tilt and angles in [workspace]"
+        turns = turns if robot.platform.angles else "does not turn"
         yield f"angles: given, but the platform of {robot.name} {turns}; leave it out"
     yield from (f"workspace: {fault}" for fault in _workspace_faults(spec, robot))
     angles = np.array(spec.angles or ())[:, None]
     for warning in unlikely_values(robot, robot.platform.angles[:1], angles):
         yield f"angles: {warning}"
     names = set(spec.quantity_names) - spec.user_quantities.keys()
+    if not robot.platform.lengths:
+        if spec.workspace is None:
+            yield f"workspace: missing; {robot.name} only turns, and needs one with tilt or angles"
+        for name in sorted(names & _OF_PLACES):
+            yield f"{name}: about places, but {robot.name} only turns"
     units = {leg.joint.force_unit for leg in robot.legs}
     for name in sorted(names & {"force", "speed", "cycle_force", "cycle_speed"}):
         if len(units) > 1:
@@ -51,8 +59,9 @@ def _workspace_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
     lengths, workspace = robot.platform.lengths, spec.workspace
     if workspace is None:
         return
+    yield from _range_faults(spec, workspace, robot)
     if workspace.lengths not in (None, len(lengths)):
-        names = " ".join(lengths)
+        names = " ".join(lengths) or "none"
         yield f"{workspace.lengths} coordinates given, {names} of {robot.name} expected"
     elif workspace.shape == "cylinder" and len(lengths) < 3:
         yield f"a cylinder given, but {robot.name} moves in a plane; give a box"
@@ -64,6 +73,28 @@ def _workspace_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
             robot, robot.coordinates, workspace_poses(placed, middle, samples=2)
         )
 
+
+def _range_faults(spec: Spec, workspace: WorkspaceTable, robot: Manipulator) -> Iterator[str]:
+    """Yield sentences on ranges of orientations that contradict a search's machine or pose."""
+    platform, ranges = robot.platform, workspace.angles or {}
+    for name in sorted(ranges.keys() - set(platform.angles)):
+        names = ", ".join(platform.angles) or "none"
+        yield f"angles: {name} given, but the angles of {robot.name} are {names}"
+    if ranges and spec.angles is not None:
+        yield "angles: given here and before the tables; give one of them"
+    if workspace.tilt is None:
+        return
+    if not platform.tilts or not has_level_axes(platform):
+        yield f"tilt: {robot.name} does not tilt to every side; give the ranges of its angles"
+    elif ranges.keys() & set(platform.angles[:2]):
+        yield f"tilt: given with a range of {' or '.join(platform.angles[:2])}; give one of them"
+    elif spec.pose is not None and any(spec.pose[len(platform.lengths) :][:2]):
+        yield "tilt: it is about the level platform; leave its tilt out of pose"
+
+
+_OF_PLACES = {"cube", "scale", "speed", "force", "drive_load"}
+_OF_PLACES |= {"stiffness", "deflection", "accuracy"}
+"""Quantities of machines that move to places."""
 
 _NEEDS = {
     "accuracy": "errors",

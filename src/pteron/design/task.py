@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.design.quantities import DesignQuantity, quantities
-from pteron.design.regions import workspace_shape
+from pteron.design.regions import oriented_region, sampled_orientations, workspace_shape
 from pteron.design.spec import FloorsTable, Spec
 from pteron.design.spec_faults import spec_faults
 from pteron.design.user_quantities import code_digest
@@ -24,6 +24,7 @@ from pteron.motion import Motor, read_motors
 from pteron.motion.payload import payload_warning
 from pteron.renamed import former_attribute
 from pteron.toml import joined_faults
+from pteron.workspace import Region
 from pteron.workspace.conditions import conditions
 from pteron.workspace.shape_samples import Shape, cube
 from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditions
@@ -31,12 +32,10 @@ from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditio
 if TYPE_CHECKING:
     import polars as pl
 
-_WORST = "about the worst sampled poses too, forces and speeds over all directions"
-"""Where quantities are taken, in the plan of a search that asks for sampled ones: earlier searches,
-which took them elsewhere, cannot be resumed."""
-
-_LATER = {"payload", "cycles", "errors", "elasticity", "motors"}
-"""Keys that a spec may have since; without them its plan is as it was."""
+_DEFINITION = (
+    "worst values about the sampled poses too, workspaces that float placed for the objective"
+)
+"""Where quantities are taken, in a search's plan: one that took them elsewhere is not resumed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,12 +71,6 @@ class Task:
             If the search does not suit the machine; all its faults are listed.
         """
         robot = load(spec.robot)
-        if not robot.platform.lengths:
-            raise ModelError(
-                f"a {robot.platform.motion} platform only turns, but a design is for places: it "
-                "needs one that moves",
-                subject=robot.name,
-            )
         faults = list(spec_faults(spec, robot))
         variables: tuple[Variable, ...] = ()
         motors: tuple[Motor, ...] = ()
@@ -106,18 +99,14 @@ class Task:
 
         Stored rows are reused only while this data is unchanged.
         """
-        spec = self.spec.model_dump(mode="json", exclude={"robot"})
-        spec = {key: part for key, part in spec.items() if part or key not in _LATER}
-        if spec["workspace"] is not None and spec["workspace"]["sides"] is None:
-            del spec["workspace"]["sides"]
+        spec = self.spec.model_dump(mode="json", exclude={"robot"}, exclude_none=True)
+        spec = {key: part for key, part in spec.items() if part != [] or key == "requirements"}
         plan: dict[str, Any] = {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
+        plan["definition of its quantities"] = _DEFINITION
         if self.motors:
             plan["motors"] = [vars(motor) for motor in self.motors]
         if quantities := self.spec.user_quantities:
             plan["user's quantities"] = {name: code_digest(q) for name, q in quantities.items()}
-        covers = {self.quantities[name].cover for name in self.quantity_names}
-        if covers & {"places", "fine", "directions", "bound"}:
-            plan["definition of its quantities"] = _WORST
         return plan
 
     @cached_property
@@ -165,12 +154,26 @@ class Task:
 
     @cached_property
     def orientations(self) -> Array:
-        """Poses (A, m) with the orientations of the search; their positions do not count."""
+        """Poses (A, m) with sampled orientations of the search; their positions do not count."""
+        return sampled_orientations(self.spec.workspace, self.robot.platform, self.stated_poses)
+
+    @cached_property
+    def stated_poses(self) -> Array:
+        """Poses (B, m) with the orientations that the file states; ranges are about them."""
         spec, angular = self.spec, self.robot.platform.angular
         pose = np.zeros(len(angular)) if spec.pose is None else np.array(spec.pose)
         if spec.angles is None:
             return pose[None]
         return np.where(angular, np.array(spec.angles)[:, None], pose)
+
+    @property
+    def has_ranges(self) -> bool:
+        """Whether the workspace has ranges of orientations, all of which are to be proved."""
+        return self.spec.workspace is not None and self.spec.workspace.has_ranges
+
+    def oriented_region(self, places: Region, share: float = 1.0) -> Region:
+        """Return a region of places at all orientations of the ranges, these scaled by `share`."""
+        return oriented_region(places, self.spec.workspace, self.robot.platform, share)
 
     @property
     def quantity_names(self) -> tuple[str, ...]:
@@ -189,6 +192,15 @@ class Task:
     def seeks_place(self) -> bool:
         """Whether each design has a shape to be placed: the largest cube, or the workspace."""
         return self.seeks_cube or self.floats
+
+    @cached_property
+    def place_quantities(self) -> tuple[str, ...]:
+        """The quantities for which a workspace that floats is placed: those that depend on it.
+
+        There are none where its place is fixed, or is where it could be largest, for `scale`.
+        """
+        names = self.quantity_names if self.floats and "scale" not in self.quantity_names else ()
+        return tuple(n for n in names if self.quantities[n].cover not in ("machine", "proved"))
 
     @property
     def ranges(self) -> Array:

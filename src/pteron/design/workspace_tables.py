@@ -47,6 +47,15 @@ def _expect_tilt(angle: float) -> float:
     return angle
 
 
+def _expect_turn(turn: tuple[float, float]) -> tuple[float, float]:
+    """Return the range [low, high] of a turn, rad; raise if it is empty, or given in degrees."""
+    if not turn[0] < turn[1]:
+        raise ValueError(f"{list(turn)} given, [low, high] expected, rad")
+    if max(map(abs, turn)) > _TURNS:
+        raise ValueError(f"{list(turn)} rad given: are these degrees?")
+    return turn
+
+
 def expect_near_points(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     """Return points; raise if their first two coordinates, m, are too large for a cell."""
     _expect_near([point[:2] for point in points])
@@ -64,10 +73,11 @@ Place = Annotated[Three, AfterValidator(_expect_near)]
 
 
 class WorkspaceTable(TomlTable):
-    """`[workspace]`: the region in which the machine must work.
+    """`[workspace]`: the region in which the machine must work, and its orientations there.
 
     A box given by its sides, a cube or a cylinder may have no center: then it floats, and each
-    design has it where the machine's margins are largest.
+    design has it where the machine does best. A machine that only turns has no places: its
+    workspace is a tilt, ranges of angles, or both.
     """
 
     low: tuple[Number, ...] | None = key("a box's least x, y, z, m", None)
@@ -80,9 +90,23 @@ class WorkspaceTable(TomlTable):
     radius: Positive | None = key("of a cylinder, m", None)
     height: Positive | None = key("of a cylinder, m", None)
     axis: Literal["x", "y", "z"] = key("of a cylinder", "z")
+    tilt: Annotated[Positive, AfterValidator(_expect_tilt)] | None = key(
+        "of the platform to every side, rad: all tilts up to it are needed", None
+    )
+    angles: dict[str, Annotated[Two, AfterValidator(_expect_turn)]] | None = key(
+        "least and greatest value of angles of the pose, rad, by name", None
+    )
     samples: Annotated[int, Field(ge=2, le=41, strict=True)] = key(
         "poses along each of its sides", 5
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _add_no_place(cls, table: Any) -> Any:
+        """Return the table; one that states orientations alone has a box of no coordinates."""
+        if isinstance(table, dict) and set() < set(table) - {"samples"} <= {"tilt", "angles"}:
+            return table | {"low": (), "high": ()}
+        return table
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
@@ -117,6 +141,26 @@ class WorkspaceTable(TomlTable):
         """Whether the workspace has no fixed place, but may be placed anywhere."""
         return self.low is None and self.center is None
 
+    @property
+    def words(self) -> str:
+        """The workspace's shape, size and place as text."""
+        sizes = " x ".join(f"{1e3 * side:.4g}" for side in self.dimensions(self.lengths or 1))
+        text = f"{self.shape} of {sizes} mm" if sizes else "orientations"
+        text += ", wherever the machine does best" if self.floats else ""
+        return f"workspace: {text}{self.range_words}"
+
+    @property
+    def range_words(self) -> str:
+        """The ranges of orientations as text that follows; empty without."""
+        tilt = "" if self.tilt is None else f", at every tilt up to {self.tilt:g} rad"
+        ranges = (f", {name} {a:g} to {b:g} rad" for name, (a, b) in (self.angles or {}).items())
+        return tilt + "".join(ranges)
+
+    @property
+    def has_ranges(self) -> bool:
+        """Whether the machine must reach ranges of orientations."""
+        return self.tilt is not None or bool(self.angles)
+
     def with_center(self, center: Iterable[float]) -> Self:
         """Return a copy of the workspace centred at `center` (k,), m."""
         return self.model_copy(update={"center": tuple(map(float, center))})
@@ -146,7 +190,9 @@ class WorkspaceTable(TomlTable):
     @property
     def lengths(self) -> int | None:
         """Number of the workspace's length coordinates; None if any number fits."""
-        return len(self.low or self.sides or self.center or ()) or (3 if self.radius else None)
+        if self.low is not None:
+            return len(self.low)
+        return len(self.sides or self.center or ()) or (3 if self.radius else None)
 
 
 class ToolWorkspaceTable(TomlTable):

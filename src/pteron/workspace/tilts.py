@@ -19,6 +19,7 @@ from pteron.kernels import Array
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.platforms import Platform
 from pteron.progress import Progress
 from pteron.renamed import former_attribute
 from pteron.result import Result
@@ -26,6 +27,7 @@ from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
 from pteron.workspace.largest_proved import largest_proved
 from pteron.workspace.proofs import Proof
+from pteron.workspace.regions import Region
 from pteron.workspace.volume import expect_places
 
 _SAMPLES = 4096
@@ -105,11 +107,8 @@ class TiltedBall:
         tilt = self.tilt * np.sqrt(shares[:, 0])
         tilt[: _SAMPLES // 3] = self.tilt
         azimuth = 2.0 * np.pi * shares[:, 1]
-        # z' = (sin(tilt) cos(azimuth), ..): pitch by its x, roll by what is left.
-        pitch = np.arcsin(np.sin(tilt) * np.cos(azimuth))
-        roll = np.arctan2(-np.sin(tilt) * np.sin(azimuth), np.cos(tilt))
         poses = np.broadcast_to(np.array(self.center), (_SAMPLES, len(self.center))).copy()
-        poses[:, self.angles[0]], poses[:, self.angles[1]] = roll, pitch
+        poses[:, self.angles] = tilt_angles(tilt, azimuth)
         if self.lengths:
             away = 2.0 * shares[:, 2:] - 1.0
             size = np.linalg.norm(away, axis=1, keepdims=True)
@@ -119,6 +118,76 @@ class TiltedBall:
             )
             poses[:, self.lengths] += self.radius * inside
         return poses
+
+
+@dataclass(frozen=True)
+class OrientedRegion:
+    """Poses at the places of a region, at all orientations of a range.
+
+    The tilt is the angle between the platform's z axis and its direction at angles zero: its cosine
+    is the product of the cosines of the two angles that tilt the platform.
+
+    Parameters
+    ----------
+    places : Region
+        The places, at one orientation.
+    low, high : tuple of float
+        Least and greatest angles of the pose, rad; those that tilt the platform come first.
+    tilt : float, optional
+        Greatest tilt, rad, of a platform that tilts.
+    """
+
+    places: Region
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    tilt: float | None = None
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest pose of the box around the region (2, m)."""
+        box = self.places.box.copy()
+        box[:, -len(self.low) :] = self.low, self.high
+        return box
+
+    def holds(self, poses: Array) -> NDArray[np.bool_]:
+        """Return whether poses (..., m) lie in the region."""
+        return self.places.holds(self._level(poses)) & ~self._turned_away(poses, poses, 0.0)
+
+    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return for boxes with corners (B, m) whether each certainly lies outside the region."""
+        apart = self.places.misses(self._level(low), self._level(high))
+        return apart | self._turned_away(low, high, 1e-12)
+
+    def onto_cone(self, poses: Array) -> None:
+        """Reduce angles of poses (..., m) that tilt the platform too far, to the greatest tilt."""
+        if self.tilt is not None:
+            first, second = np.moveaxis(poses[..., -len(self.low) :][..., :2], -1, 0)
+            azimuths = np.arctan2(-np.sin(first) * np.cos(second), np.sin(second))
+            leans = np.arccos(np.cos(first) * np.cos(second))
+            leans = np.minimum(leans, (1.0 - 1e-9) * self.tilt)
+            poses[..., -len(self.low) :][..., :2] = tilt_angles(leans, azimuths)
+
+    def _level(self, poses: Array) -> Array:
+        """Return poses (..., m) with the angles at which the region of places is defined."""
+        level = poses.copy()
+        level[..., -len(self.low) :] = self.places.box[0, -len(self.low) :]
+        return level
+
+    def _turned_away(self, low: Array, high: Array, slack: float) -> NDArray[np.bool_]:
+        """Return whether boxes (..., m) hold no orientation of the range, up to a slack."""
+        first, last = low[..., -len(self.low) :], high[..., -len(self.low) :]
+        away = ((first > self.high) | (last < self.low)).any(axis=-1)
+        if self.tilt is None:
+            return np.asarray(away)
+        least = np.clip(0.0, first[..., :2], last[..., :2])
+        return np.asarray(away | (np.cos(least).prod(axis=-1) < np.cos(self.tilt) - slack))
+
+
+def tilt_angles(tilt: Array | float, azimuth: Array) -> Array:
+    """Return the two angles (..., 2) that tilt a platform towards an azimuth, rad."""
+    # z' = (sin(tilt) cos(azimuth), ..): the second angle by its x, the first by what is left.
+    across, along = np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth)
+    return np.stack([np.arctan2(-along, np.cos(tilt)), np.arcsin(across)], axis=-1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -251,14 +320,19 @@ def largest_ball(
     return _largest_region(robot, reference, reach, tolerance, given, sizes, report)
 
 
+def has_level_axes(platform: Platform) -> bool:
+    """Return whether the axes of a platform, if it has two, are level and at right angles."""
+    return not platform.second_axis or (
+        abs(dot(platform.axis, platform.second_axis)) <= PARALLEL_TOLERANCE
+        and max(abs(platform.axis[2]), abs(platform.second_axis[2])) <= PARALLEL_TOLERANCE
+    )
+
+
 def _expect_tilting(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
     """Return the machine and the pose (m,); raise if the platform cannot tilt to every side."""
     machine = as_manipulator(robot)
     platform = machine.platform
-    upright = not platform.second_axis or (
-        abs(dot(platform.axis, platform.second_axis)) <= PARALLEL_TOLERANCE
-        and max(abs(platform.axis[2]), abs(platform.second_axis[2])) <= PARALLEL_TOLERANCE
-    )
+    upright = has_level_axes(platform)
     tilts = platform.tilts
     if not tilts or not upright:
         raise ModelError(
