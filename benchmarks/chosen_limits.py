@@ -98,7 +98,7 @@ def compared(job: Job, candidate: Candidate) -> dict[str, float]:
     poses = middle + half * np.vstack([rng.uniform(-1.0, 1.0, (_POSES, 3)), corners])
     values = [machine.limits(pose) for pose in poses]
     shares = {}
-    for row in candidate.limit_rows:
+    for row in candidate.limits:
         if row.name in values[0]:
             found = np.array([each[row.name] for each in values])
             shares[row.name] = float(

@@ -369,7 +369,7 @@ def test_worse_tilts_are_looked_for_in_the_whole_cone():
 def test_rams_go_as_far_as_the_job_asks():
     space = {"size": [0.2, 0.2, 0.1], "tilt": 0.2}
     (evaluator,) = evaluators_of(of(workspace=space, kinds=["stewart"])).values()
-    kept = [one for one in search_kind(evaluator, 30, 0) if not one.misses]
+    kept = [one for one in search_kind(evaluator, 120, 0) if not one.misses]
     assert kept
     robot, middle = kept[-1].robot, kept[-1].middle
     low, high = np.array([leg.limits for leg in robot.legs]).T

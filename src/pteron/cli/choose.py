@@ -133,7 +133,7 @@ def _show(choice: Choice) -> None:
             *(f"  {plain(candidate.cycle_text)}" for _ in range(bool(candidate.cycle_text))),
             *(f"  check: {plain(text)}" for text in candidate.checked),
         )
-        limits = ((row.name, *row.texts) for row in candidate.limit_rows)
+        limits = ((row.name, *row.texts) for row in candidate.limits)
         names = ("worst", "permitted", "margin")
         show(table("limit", *names, "place", rows=limits, numbers=names))
     for candidate in choice.candidates:

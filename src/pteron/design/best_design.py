@@ -87,8 +87,8 @@ def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
             f"{1e3 * job.floors.clearance:g} mm required"
         )
     for row in candidate.limits:
-        if row["margin"] < 1.0:
-            return f"{row['name']} of {row['value']:.3g}, {row['limit']:.3g} permitted"
+        if row.margin < 1.0:
+            return f"{row.name} of {row.value:.3g}, {row.limit:.3g} permitted"
     rated = figures.get("rated_margin", np.inf)
     if rated * job.limits.rated < 1.0:
         return f"torque over rated torque of {1.0 / rated:.3g}, {job.limits.rated:g} permitted"
@@ -110,7 +110,7 @@ def _candidate(
     best: list[Rating],
 ) -> Candidate:
     """Return the candidate of a proved design: figures, margins, drives, sizes and proof text."""
-    robot = rating.machine
+    robot = rating.robot = replace(rating.machine, home=tuple(rating.middle.tolist()))
     loaded_robot = evaluator.add_payload(robot)
     figures = dict(rating.figures)
     time = evaluator.kind.numbers(rating.values).get("time")
@@ -162,7 +162,7 @@ def _candidate(
         tuple({name: r.figures[name] for name in objectives} for r in best),
         text_of(replace(robot, name=f"{evaluator.kind.name}-chosen")),
         tuple(rating.middle.tolist()),
-        tuple(row.as_dict() for row in limits),
+        limits,
         tuple(examine_text(text_of(robot))),
         _part_counts(rating),
         {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -60,8 +59,8 @@ class Candidate(Result):
         The machine's file, with its drives; empty where there is none.
     middle : tuple of float
         The pose in the middle of its workspace.
-    limits : tuple of dict
-        What an engineer limits in every machine, by the attributes of `LimitRow`.
+    limits : tuple of LimitRow
+        What an engineer limits in every machine.
     checked : tuple of str
         What `pteron check` warns of.
     parts : dict
@@ -86,7 +85,7 @@ class Candidate(Result):
     front: tuple[dict[str, float], ...] = ()
     robot: str = ""
     middle: tuple[float, ...] = ()
-    limits: tuple[dict[str, Any], ...] = ()
+    limits: tuple[LimitRow, ...] = ()
     checked: tuple[str, ...] = ()
     parts: dict[str, int] = field(default_factory=dict)
     stocks: dict[str, str] = field(default_factory=dict)
@@ -148,11 +147,6 @@ class Candidate(Result):
         """What links are cut from, and numbers and names of joints and rails, as text."""
         links = [f"{key} links {stock}" for key, stock in self.stocks.items()]
         return ", ".join([*links, *(f"{count} x {name}" for name, count in self.parts.items())])
-
-    @property
-    def limit_rows(self) -> list[LimitRow]:
-        """The limits of the machine, each with its worst value and place."""
-        return [LimitRow(**row) for row in self.limits]
 
     @property
     def cycle_text(self) -> str:

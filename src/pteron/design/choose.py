@@ -49,7 +49,7 @@ _SOURCES = (*EQUATIONS, "design", "dynamics", "indices", "kinematics", "motion",
 _HEAVY = 100.0
 """Payload, kg, from which a workspace below 1 m is doubted."""
 
-_TUPLES = ("why", "drives", "front", "middle", "limits", "checked")
+_TUPLES = ("why", "drives", "front", "middle", "checked")
 """Attributes of a candidate that a file has as lists."""
 
 _KEPT = "kinds"

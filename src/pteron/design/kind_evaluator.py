@@ -342,7 +342,7 @@ class KindEvaluator:
             "energy": self._energy(rating.robot, states),
             "cycle_time": time or 0.0,
         }
-        spacing = self.kind.links.pair * self.kind.platform_radius(rating.robot)
+        spacing = self.kind.pair_spacing(rating.robot)
         parts = rating.joints, rating.parts
         room, where = room_between_parts(rating.robot, rating.options, *parts, spacing)
         if room < 0.0:

@@ -74,6 +74,9 @@ largest level cube of the catalog's machines is a sixth and a fourteenth of the 
 _ALUMINIUM = 2700.0
 """kg/m^3."""
 
+_LEAST_PAIR = 0.02
+"""Least distance of the rods of a pair, m."""
+
 _RAIL = 0.017
 """Half the width of a rail, m, before it is chosen by its load."""
 
@@ -219,16 +222,17 @@ class Kind:
                 stock.inner,
                 MATERIALS[name.split("-")[0]],
                 rods if key == "lower" else 1,
-                self.links.pair * self.platform_radius(robot) if key == "lower" else np.inf,
+                self.pair_spacing(robot) if key == "lower" and rods > 1 else np.inf,
             )
             for key, name in self.link_stocks(point).items()
             if key in keys or key == "lower"
             for stock in [Stock.parse(name)]
         }
 
-    def platform_radius(self, robot: Manipulator) -> float:
-        """Return the greatest distance of a platform point from the platform's axis, m."""
-        return float(np.linalg.norm(platform_points(robot), axis=1).max())
+    def pair_spacing(self, robot: Manipulator) -> float:
+        """Return the distance of the two rods of a pair, m."""
+        radius = float(np.linalg.norm(platform_points(robot), axis=1).max())
+        return max(self.links.pair * radius, _LEAST_PAIR)
 
     def with_travel(self, leg: Any, travel: tuple[float, float], point: Array) -> Any:
         """Return a leg with travel limits (low, high), m; a ram with tubes of that length."""

@@ -54,6 +54,10 @@ class LimitRow(Result):
     margin: float
     place: str
 
+    def __repr__(self) -> str:
+        """Return the name of the limit and its margin in one line."""
+        return f"<LimitRow of {self.name!r}: margin {self.margin:.3g}>"
+
     @property
     def texts(self) -> tuple[str, str, str, str]:
         """Value, limit and margin as text with units, and the place."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.kernels import Array, geometry_only
-from pteron.kinematics import inverse_kinematics, random_poses
+from pteron.kinematics import inverse_kinematics
+from pteron.kinematics.sampling import sample_poses
 from pteron.manipulator import Manipulator
 from pteron.manipulator.variants import elbow_signs, elbows_of, mode_elbows, with_elbows
 from pteron.tolerances import ROUNDING
@@ -80,7 +81,9 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
         columns = zip(file_elbows, zip(*modes, strict=True), strict=True)
         other = tuple(-s if -s in column else s for s, column in columns)
         modes = list(dict.fromkeys([file_elbows, other, modes[0], modes[-1]]))
-    poses = np.vstack([random_poses(geometry_only(robot), _DRAWN, type_i=0.0, type_ii=0.0), home])
+    # Of a machine with a small share of its reach within limits there are fewer, or home alone.
+    drawn = sample_poses(geometry_only(robot), _DRAWN, np.random.default_rng(0))
+    poses = np.vstack([drawn, home])
     least = _UPRIGHT * max(leg.size for leg in robot.legs)
     candidates = []
     for signs in modes:
