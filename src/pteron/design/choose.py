@@ -18,6 +18,7 @@ from pteron.design.job import Job
 from pteron.design.kind_evaluator import KindEvaluator
 from pteron.design.kind_search import search_kind
 from pteron.design.kinds import Kind, fitting_kinds, joint_kind
+from pteron.design.limit_rows import LimitRow
 from pteron.errors import DataError, PteronError, warn_unlikely
 from pteron.html_table import Overview, frame_overview
 from pteron.json_values import json_ready
@@ -333,10 +334,8 @@ class _CandidateStore:
             record = json.loads(file.read_text(encoding="utf-8"))
             if record.pop("digest", None) != self._digest(name):
                 return None
-            lists = {
-                key: tuple(record[key])
-                for key in ("why", "drives", "front", "middle", "limits", "checked")
-            }
+            lists = {key: tuple(record[key]) for key in _TUPLES}
+            lists["limits"] = tuple(LimitRow(**row) for row in record["limits"])
             return Candidate(**record | lists)
         except (ValueError, TypeError, KeyError):
             return None
