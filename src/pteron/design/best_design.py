@@ -89,6 +89,8 @@ def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
     for row in candidate.limits:
         if row.margin < 1.0:
             return f"{row.name} of {row.value:.3g}, {row.limit:.3g} permitted"
+    if (most := job.most.energy) is not None and figures["energy"] > most:
+        return f"energy of {figures['energy']:.4g} J, {most:g} J permitted"
     rated = figures.get("rated_margin", np.inf)
     if rated * job.limits.rated < 1.0:
         return f"torque over rated torque of {1.0 / rated:.3g}, {job.limits.rated:g} permitted"
@@ -144,7 +146,8 @@ def _candidate(
             return np.asarray(1.0 / loads.tool_compliance(stiffnesses[:1])[0])
 
         figures["deflection"] = float(required.force / least(gives))
-    cycle = _cycle_at(rating, margins.place)
+    cycle = None if margins.place is None else _cycle_at(rating, *margins.place)
+    figures["energy"] = _energy(evaluator, rating, loaded_robot)
     figures |= _cycle_figures(loaded_robot, cycle, margins.place)
     times = _shortest_times(evaluator, loaded_robot, rating, margins.place)
     objectives = shown_objectives(evaluator.job.objectives)
@@ -174,15 +177,26 @@ def _candidate(
     )
 
 
-def _cycle_at(rating: Rating, place: tuple[Places, int] | None) -> Motion | None:
-    """Return the cycle at the place where the drives' margin is least; None without cycles."""
-    if place is None:
-        return None
-    cycle, k = place
+def _cycle_at(rating: Rating, cycle: Places, k: int) -> Motion:
+    """Return a cycle at one of its places."""
     duration = cycle.duration or rating.figures["cycle_time"]
     pose, velocity, acceleration = (part[k] for part in cycle.states)
     time = np.linspace(0.0, duration, cycle.samples)
     return Motion(time, rating.middle + pose, velocity / duration, acceleration / duration**2)
+
+
+def _energy(evaluator: KindEvaluator, rating: Rating, robot: Manipulator) -> float:
+    """Return the energy that the drives give in a cycle at its worst place, J, by `size`.
+
+    Of cycles with shares it is their mean, of others the greatest.
+    """
+    worst = []
+    for cycle in evaluator.cycles:
+        places = (_cycle_at(rating, cycle, k) for k in range(len(cycle.turns)))
+        given = (size(robot, motion, dwell=cycle.dwell).given_energy.sum() for motion in places)
+        worst.append(max(map(float, given)))
+    shares = [cycle.share for cycle in evaluator.cycles]
+    return float(np.average(worst, weights=shares)) if any(shares) else max(worst, default=0.0)
 
 
 def _table_text(robot: Manipulator, motion: Motion) -> str:

@@ -158,7 +158,8 @@ class Candidate(Result):
             f"at {self.worst} the motors give at most {figures['peak_torque']:.3g} N m and "
             f"{figures['rms_torque']:.3g} N m root mean square, at up to "
             f"{figures['motor_speed']:.3g} rad/s; the drives give {figures['energy_given']:.3g} J "
-            f"a cycle and brake {figures['energy_braked']:.3g} J"
+            f"a cycle (elsewhere up to {figures['energy']:.3g} J) and brake "
+            f"{figures['energy_braked']:.3g} J"
         )
 
     @property
