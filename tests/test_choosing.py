@@ -23,6 +23,7 @@ from pteron.design.choose import evaluators_of
 from pteron.design.kind_search import search_kind
 from pteron.design.load_margins import margins_of
 from pteron.design.machine_space import tool_places
+from pteron.design.parts_room import room_between_parts
 from pteron.design.proofs import proof_sentence
 from pteron.design.rating import Rating
 from pteron.design.regions import kind_regions
@@ -382,6 +383,35 @@ def test_rams_go_as_far_as_the_job_asks():
     # The tubes are as long as the shortest ram.
     own = robot.legs[0].bodies["u"].values[0]
     assert own == pytest.approx(robot.legs[1].bodies["u"].values[0] * low[0] / low[1], rel=1e-9)
+
+
+def test_drives_and_joints_have_room_on_base_and_platform():
+    (evaluator,) = evaluators_of(of(kinds=["delta"])).values()
+    one = next(r for r in search_kind(evaluator, 60, 0) if not r.misses)
+    parts = one.options, one.joints, one.parts
+    distance, _, box = room_between_parts(one.machine, *parts, 0.04)
+    assert distance > 0.0
+    width, length = one.options[0].outline
+    ends = [
+        np.array(leg.guide_point) + side * length * np.array(leg.direction)
+        for leg in one.machine.legs
+        for side in (0.0, 1.0, -1.0)
+    ]
+    inside = [bool((box[0] <= end).all() and (end <= box[1]).all()) for end in ends]
+    assert all(inside[::3])
+    assert sum(inside) >= 6  # all motors on one side
+    assert one.figures["height"] >= width
+    assert one.figures["footprint"] >= np.prod(np.ptp(box, axis=0)[:2])
+    near = [
+        replace(leg, guide_point=(0.05 * leg.guide_point[0], 0.05 * leg.guide_point[1], 0.0))
+        for leg in one.machine.legs
+    ]
+    close, where, _ = room_between_parts(replace(one.machine, legs=tuple(near)), *parts, 0.04)
+    assert close < 0.0
+    assert where == "on the base"
+    wide, where, _ = room_between_parts(one.machine, *parts, 1.0)
+    assert wide < 0.0
+    assert where == "on the platform"
 
 
 def test_shares_make_a_duty_cycle():

@@ -67,7 +67,8 @@ def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
 
     def extents(poses: Array) -> Array:
         """Return the machine's extents (K, 6 + boxes), m, at poses (K, m) about the middle."""
-        return evaluator.machine_space.extents(robot, rating.middle + poses, rating.middle)
+        poses = rating.middle + poses
+        return evaluator.machine_space.extents(robot, poses, rating.middle, rating.drives_box)
 
     sizes, misses = evaluator.machine_space.judge_extents(evaluator.worst(robot, extents, DENSE)[0])
     rating.figures |= sizes

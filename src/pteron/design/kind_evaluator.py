@@ -13,7 +13,7 @@ from pteron.design.cycle_places import Places, cycles_of
 from pteron.design.job import OBJECTIVES, Job
 from pteron.design.joint_loads import JointLoads
 from pteron.design.kinds import Kind, joint_kind, slides, with_joint_parts
-from pteron.design.machine_space import MachineSpace
+from pteron.design.machine_space import TIGHT, MachineSpace, Misses
 from pteron.design.parts_room import room_between_parts
 from pteron.design.quantities import moving_mass
 from pteron.design.rating import Rating
@@ -196,6 +196,11 @@ class KindEvaluator:
         figures, misses = self.machine_space.evaluate(
             rating.machine, rating.middle + self.visited, rating.middle
         )
+        self._record(rating, figures, misses)
+
+    @staticmethod
+    def _record(rating: Rating, figures: dict[str, float], misses: Misses) -> None:
+        """Record figures of the space that a machine takes, and its violated limits."""
         rating.figures |= figures
         for name, (share, words) in misses.items():
             rating.miss(name, share, words)
@@ -344,7 +349,12 @@ class KindEvaluator:
         }
         spacing = self.kind.pair_spacing(rating.robot)
         parts = rating.joints, rating.parts
-        room, where = room_between_parts(rating.robot, rating.options, *parts, spacing)
+        room, where, box = room_between_parts(rating.robot, rating.options, *parts, spacing)
+        rating.drives_box = box
+        extents = self.machine_space.extents(
+            rating.robot, rating.middle + self.visited, rating.middle, box
+        )
+        self._record(rating, *self.machine_space.judge_extents(extents.min(axis=0), TIGHT))
         if room < 0.0:
             words = f"drives, rails or joints overlap by {-1e3 * room:.3g} mm {where}"
             rating.miss("room for parts", -room / _ROOM, words)

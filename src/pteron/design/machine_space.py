@@ -21,7 +21,7 @@ _HALVINGS = 24
 _SPARE = 1e-3
 """Additional clearance of a search over the requirement, m."""
 
-_TIGHT = 2e-3
+TIGHT = 2e-3
 """Length by which a search shrinks the cell and grows keep-out boxes, m."""
 
 _CLOSE = 0.01
@@ -47,7 +47,7 @@ class MachineSpace:
         floor = self._job.floors.clearance
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
         figures, misses = self.judge_extents(
-            self._extents_of_points(robot, poses, points, middle).min(axis=0), _TIGHT
+            self._extents_of_points(robot, poses, points, middle).min(axis=0), TIGHT
         )
         clear = self._clearance(robot, poses, points)
         if clear < floor + _SPARE:
@@ -56,14 +56,21 @@ class MachineSpace:
             misses["clearance"] = (floor + _SPARE - clear) / _CLOSE, words
         return figures, misses
 
-    def extents(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
+    def extents(
+        self, robot: Manipulator, poses: Array, middle: Array, fixed: Array | None = None
+    ) -> Array:
         """Return a machine's extents at poses (N, 6 + boxes), from the tool's middle, m.
 
         The columns are the least coordinates, the negated greatest ones, and the distance to each
-        keep-out box.
+        keep-out box. The box (2, 3) around `fixed` parts, such as motors, is within the extents.
         """
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
-        return self._extents_of_points(robot, poses, points, middle)
+        extents = self._extents_of_points(robot, poses, points, middle)
+        if fixed is not None:
+            center = tool_places(robot, middle[None])[0]
+            box = np.concatenate([fixed[0] - center, center - fixed[1]])
+            extents[:, :6] = np.minimum(extents[:, :6], box)
+        return extents
 
     def _extents_of_points(
         self, robot: Manipulator, poses: Array, points: Array, middle: Array

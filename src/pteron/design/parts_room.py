@@ -24,17 +24,23 @@ _Capsules = list[tuple[int, Array, Array, float]]
 
 def room_between_parts(
     robot: Manipulator, options: Sequence[Option], joints: Joints, parts: Parts, spacing: float
-) -> tuple[float, str]:
-    """Return the least distance, m, of parts of different legs, below 0 if they overlap, and where.
+) -> tuple[float, str, Array]:
+    """Return the least distance, m, of parts of different legs, where, and the drives' box (2, 3).
+
+    The distance is below 0 if parts overlap.
 
     Motor and gearbox of a crank lie along its axis, on one side of all cranks; that of a slider
     beyond one end of its rail, along it; that of a ram is in line with the ram. The rods of a pair
     are `spacing` apart, m.
     """
     sides = (_on_base(robot, options, joints, parts, side) for side in (1.0, -1.0))
-    base = max(map(_least_distance, sides)), "on the base"
+    drives = max(sides, key=_least_distance)
+    ends = np.array([(start, end) for _, start, end, _ in drives])
+    radii = np.array([radius for *_, radius in drives])[:, None]
+    box = np.array([(ends.min(axis=1) - radii).min(axis=0), (ends.max(axis=1) + radii).max(axis=0)])
+    base = _least_distance(drives), "on the base"
     platform = _least_distance(_on_platform(robot, joints, parts, spacing)), "on the platform"
-    return min(base, platform)
+    return *min(base, platform), box
 
 
 def _on_base(

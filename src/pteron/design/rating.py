@@ -49,6 +49,8 @@ class Rating:
         The loads on links and joints at the corners of the workspace.
     joints, parts : list of list
         The joints of each leg, and the part chosen for each.
+    drives_box : array, shape (2, 3), or None
+        Least and greatest coordinates of motors, gears and rails, m.
     """
 
     values: Array
@@ -64,6 +66,7 @@ class Rating:
     structure: Structure | None = None
     joints: list[list[Joint]] = field(default_factory=list)
     parts: list[list[JointPart]] = field(default_factory=list)
+    drives_box: Array | None = None
 
     @property
     def machine(self) -> Manipulator:
