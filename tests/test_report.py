@@ -247,7 +247,8 @@ def test_the_page_shows_the_numbers(name):
     joints = {leg.joint.noun: leg.joint.force_unit for leg in found.robot.legs}
     for noun in ("slider", "crank", "shaft"):
         assert (noun in text.replace("the slider is tilted", "")) == (noun in joints)
-    assert ("torque" in text) == ("crank" in joints)
+    template = "forces and torques depend on these masses"  # whatever the joints
+    assert ("torque" in text.replace(template, "")) == ("crank" in joints)
     for words in ("in a plane", "Workspace area", "dm²", "lies in the machine's plane"):
         assert (words in text) == (name == "planar")
     for words in ("counts as a point mass", "way of the tool's centre point", "Passive joints"):

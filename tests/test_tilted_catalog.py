@@ -101,7 +101,7 @@ def test_a_map_of_lengths_and_an_angle_has_the_reach_of_every_angle():
         assert z.least <= low < high <= z.greatest
 
 
-def test_a_design_of_a_platform_that_only_turns_is_refused(tmp_path):
+def test_a_design_of_a_platform_that_only_turns_needs_a_range_of_turns(tmp_path):
     file = tmp_path / "design.toml"
     file.write_text(
         'robot = "wrist"\n[[variables]]\nmoves = "legs.platform_point.z"\nrange = [-0.05, 0.05]\n'
@@ -110,4 +110,4 @@ def test_a_design_of_a_platform_that_only_turns_is_refused(tmp_path):
     )
     done = run(f"design {file} --out {tmp_path / 'out'}")
     assert done.exit_code == 2
-    assert "wrist: a 3R platform only turns, but a design is for places" in done.stderr
+    assert "workspace: missing; wrist only turns, and needs one with tilt or angles" in done.stderr
