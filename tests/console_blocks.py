@@ -395,7 +395,12 @@ GIVEN: dict[str, dict[str, Maker]] = {
         "loose.toml": block("# loose.toml"),
     },
     "docs/how-to/from-a-task-to-a-machine.md": {
-        "machines/linear-delta.toml": by("pteron new linear-delta --out machines/linear-delta.toml")
+        "machines/linear-delta.toml": by(
+            "pteron new linear-delta --out machines/linear-delta.toml"
+        ),
+        "machines/linear-delta-cycle.csv": by(
+            "pteron cycle machines/linear-delta.toml --out machines/linear-delta-cycle.csv"
+        ),
     },
     "docs/how-to/motion-simulators.md": {"drive.csv": flight},
     "docs/how-to/payloads-and-tools.md": {
@@ -507,7 +512,7 @@ def run_page(name: str, folder: Path) -> dict[str, str]:
 def make_given(name: str, path: Path) -> None:
     """Make a file that a page takes for granted, and those before it in its table."""
     for file, make in GIVEN[name].items():
-        target = path.with_name(file) if "/" not in file else path
+        target = path.with_name(Path(file).name)
         if not target.exists():
             target.parent.mkdir(parents=True, exist_ok=True)
             make(target, TEXTS[name])
