@@ -144,7 +144,8 @@ def _candidate(
         def gives(poses: Array) -> Array:
             """Return the tool's least stiffness (K,), N/m, at poses (K, m)."""
             loads = Structure(loaded_robot, poses, still, tubes).loads
-            return np.asarray(1.0 / loads.tool_compliance(stiffnesses[:1])[0])
+            rows = loads.tool_actuators / np.sqrt(stiffnesses)[:, None]
+            return np.asarray(1.0 / np.linalg.eigvalsh(loads.tool_links + rows.mT @ rows)[:, -1])
 
         figures["deflection"] = float(required.force / least(gives))
     cycle = None if margins.place is None else _cycle_at(rating, *margins.place)
@@ -167,7 +168,7 @@ def _candidate(
         text_of(replace(robot, name=f"{evaluator.kind.name}-chosen")),
         tuple(rating.middle.tolist()),
         limits,
-        tuple(examine_text(text_of(robot))),
+        tuple(check_warnings(text_of(robot))),
         _part_counts(rating),
         {
             key: name
@@ -237,7 +238,7 @@ def _part_counts(rating: Rating) -> dict[str, int]:
     return dict(counts)
 
 
-def examine_text(text: str) -> list[str]:
+def check_warnings(text: str) -> list[str]:
     """Return what `pteron check` warns of in a machine's file with this text."""
     robot = loads(text)
     return list(examine(robot, home_pose(robot)).warnings)
