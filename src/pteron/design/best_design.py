@@ -137,17 +137,7 @@ def _candidate(
         errors = _tolerances(evaluator, rating)
         figures["error"] = -least(lambda poses: -greatest_errors(accuracy, robot, poses, errors))
     if (required := evaluator.job.stiffness) is not None:
-        stiffnesses = np.array([option.stiffness for option in rating.options])
-        tubes = evaluator.kind.tubes(robot, rating.values)
-        still = replace(evaluator.demand(1.0), speed=0.0)
-
-        def gives(poses: Array) -> Array:
-            """Return the tool's least stiffness (K,), N/m, at poses (K, m)."""
-            loads = Structure(loaded_robot, poses, still, tubes).loads
-            rows = loads.tool_actuators / np.sqrt(stiffnesses)[:, None]
-            return np.asarray(1.0 / np.linalg.eigvalsh(loads.tool_links + rows.mT @ rows)[:, -1])
-
-        figures["deflection"] = float(required.force / least(gives))
+        figures["deflection"] = required.force / least(_tool_stiffness(evaluator, rating))
     cycle = None if margins.place is None else _cycle_at(rating, *margins.place)
     figures["energy"] = _energy(evaluator, rating, loaded_robot)
     figures |= _cycle_figures(loaded_robot, cycle, margins.place)
@@ -177,6 +167,22 @@ def _candidate(
         },
         "" if cycle is None else _table_text(robot, cycle),
     )
+
+
+def _tool_stiffness(evaluator: KindEvaluator, rating: Rating) -> Callable[[Array], Array]:
+    """Return the function of poses (K, m) that gives the tool's least stiffness there (K,), N/m."""
+    robot = evaluator.add_payload(rating.machine)
+    stiffnesses = np.array([option.stiffness for option in rating.options])
+    tubes = evaluator.kind.tubes(robot, rating.values)
+    still = replace(evaluator.demand(1.0), speed=0.0)
+
+    def tool_stiffness(poses: Array) -> Array:
+        """Return the tool's least stiffness (K,), N/m, at poses (K, m)."""
+        loads = Structure(robot, poses, still, tubes).loads
+        rows = loads.tool_actuators / np.sqrt(stiffnesses)[:, None]
+        return np.asarray(1.0 / np.linalg.eigvalsh(loads.tool_links + rows.mT @ rows)[:, -1])
+
+    return tool_stiffness
 
 
 def _cycle_at(rating: Rating, cycle: Places, k: int) -> Motion:

@@ -332,6 +332,12 @@ class KindEvaluator:
                 options[leg] = all_.all[first]
         rating.near = near / len(self.groups)
         rating.options = tuple(o for o in options if o is not None)
+        self._record_drives(rating, states, time)
+
+    def _record_drives(
+        self, rating: Rating, states: Sequence[CycleStates], time: float | None
+    ) -> None:
+        """Give the machine its chosen drives; record prices, masses, energy, and the room taken."""
         pairs = zip(rating.machine.legs, rating.options, strict=True)
         legs_with = tuple(replace(leg, drive=o.drive(_travel(leg))) for leg, o in pairs)
         rating.robot = replace(rating.machine, legs=legs_with)
